@@ -1,0 +1,1 @@
+"""Gridwright's Python client and command line."""

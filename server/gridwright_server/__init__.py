@@ -1,0 +1,1 @@
+"""Gridwright's mapping server."""

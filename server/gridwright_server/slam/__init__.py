@@ -1,0 +1,1 @@
+"""The multilevel Rao-Blackwellized particle filter: pure numpy and numba."""
