@@ -15,7 +15,7 @@ class SensorStream:
 
     def __init__(
         self,
-        stub: MappingServiceStub[Any],
+        stub: "MappingServiceStub[Any]",
         session_id: str,
         items: Iterable[mapping.SensorItem],
         want_poses: bool,

@@ -1,0 +1,1 @@
+"""Between messages and the server's own types; all validation of input happens here."""
