@@ -116,8 +116,8 @@ class _Lasers:
             stamp_ns=sweep.stamp_ns,
             sensor_id=sweep.sensor_id,
             geometry=self._geometries[key],
-            # Infinite, so that no rounding to float32 on the way makes a wall of the maximum.
-            ranges_m=np.where(sweep.ranges_m >= limit_m, np.float32(np.inf), sweep.ranges_m),
+            # Infinite, for 51.16 as a float32 is below 51.16 as a float64: a wall to whoever compares.
+            ranges_m=np.where(sweep.ranges_m >= np.float32(limit_m), np.float32(np.inf), sweep.ranges_m),
             range_max_m=limit_m,
             odom_from_base=sweep.odom_from_base,
         )

@@ -33,17 +33,15 @@ def no_return_limit_m(sweeps: list[NDArray[np.float32]], maximum_m: float | None
     if not sweeps:
         return named_m
     ranges_m = np.concatenate(sweeps)
-    # A float32 range may print as the maximum and lie a rounding below it.
-    reach_m = float(np.nextafter(np.float32(named_m), np.float32(0.0)))
-    below = ranges_m[ranges_m < reach_m]  # also drops NaN
+    below = ranges_m[ranges_m < np.float32(named_m)]  # also drops NaN
     if below.size == 0:
-        return reach_m
+        return named_m
     top_m = float(below.max())
     shelf_edge_m = top_m * (1.0 - _SHELF_WIDTH)
     shelf = below[below >= shelf_edge_m]
     if _is_shelf(shelf, below, ranges_m.size, sweeps):
         return float(shelf.min())
-    return reach_m
+    return named_m
 
 
 def _is_shelf(
