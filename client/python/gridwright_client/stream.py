@@ -51,8 +51,11 @@ class SensorStream:
 
     def _requests(self) -> Iterator[mapping.StreamSensorDataRequest]:
         yield mapping.StreamSensorDataRequest(start=self._start)
+        for batch in batches(self._items_until_error(), self._batch_size):
+            yield mapping.StreamSensorDataRequest(batch=batch)
+
+    def _items_until_error(self) -> Iterator[mapping.SensorItem]:
         try:
-            for batch in batches(self._items, self._batch_size):
-                yield mapping.StreamSensorDataRequest(batch=batch)
+            yield from self._items
         except Exception as error:  # gRPC would only log it and cancel the call
             self._items_error = error
