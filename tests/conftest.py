@@ -1,6 +1,8 @@
 """Servers and clients for the tests that need them."""
 
+import os
 import threading
+from pathlib import Path
 
 import grpc
 import numpy as np
@@ -116,3 +118,13 @@ def feed():
     feed = Feed()
     yield feed
     feed.close()
+
+
+@pytest.fixture(scope="session")
+def recorded_logs():
+    """The folder of recorded logs: GRIDWRIGHT_DATA, or a folder `shared/data` beside the checkout."""
+    default = Path(__file__).parents[2] / "shared" / "data"
+    folder = Path(os.environ.get("GRIDWRIGHT_DATA", default))
+    if not (folder / "intel" / "intel.clf").is_file():
+        pytest.skip(f"no recorded logs in {folder}: set GRIDWRIGHT_DATA to the folder that holds intel/intel.clf")
+    return folder

@@ -1,0 +1,1 @@
+"""Replaying a recorded log through a mapping server."""
