@@ -10,7 +10,6 @@ import pytest
 from fake_mapper import FakeMapper
 from gridwright.v1.mapping_service_pb2_grpc import MappingServiceStub
 from gridwright.v1.session_service_pb2_grpc import SessionServiceStub
-
 from gridwright_client.client import MappingClient
 from gridwright_client.items import laser_scan, odometry, sensor_item
 from gridwright_server.app import start_server
@@ -81,6 +80,17 @@ def drive(count, first=1):
         stamp_ns = number * SECOND_NS
         data = odometry(stamp_ns, 0.1 * number, 0.0, 0.01) if number % 2 else scan_message(stamp_ns)
         yield sensor_item(number, data)
+
+
+def until_error(stream):
+    """What a stream gave and the error that ended it."""
+    received = []
+    try:
+        for element in stream:
+            received.append(element)
+    except Exception as error:
+        return received, error
+    raise AssertionError("the stream ended well")
 
 
 class Feed:

@@ -3,7 +3,6 @@
 import threading
 
 import numpy as np
-
 from gridwright_server.slam.types import PoseEstimate, ScanResult, Trajectory, Verdict
 
 SECRET = "the path /etc/secret"
@@ -18,9 +17,8 @@ class FakeSnapshot:
         self.resolution_m = 0.05
         self.tile_cells = tile_cells
         side = int(np.ceil(np.sqrt(tiles)))
-        self.tile_origins = np.array(
-            [((k % side - 2) * tile_cells, (k // side - 1) * tile_cells) for k in range(tiles)], dtype=np.int32
-        ).reshape(-1, 2)
+        places = [(k % side - 2, k // side - 1) for k in range(tiles)]
+        self.tile_origins = np.array(places, dtype=np.int32).reshape(-1, 2) * np.int32(tile_cells)
         self.closed = threading.Event()
 
     def occupancy(self, tile):

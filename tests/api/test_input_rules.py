@@ -9,8 +9,13 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from gridwright.v1 import mapping_service_pb2 as mapping
 from gridwright.v1 import session_service_pb2 as pb
 from gridwright.v1.geometry_pb2 import Pose2D
-from gridwright.v1.sensor_pb2 import VERDICT_PROCESSED, VERDICT_REJECTED_INVALID, LaserMounting, LaserScan, Odometry
-
+from gridwright.v1.sensor_pb2 import (
+    VERDICT_PROCESSED,
+    VERDICT_REJECTED_INVALID,
+    LaserMounting,
+    LaserScan,
+    Odometry,
+)
 from gridwright_client.errors import GridwrightRpcError
 from gridwright_client.items import odometry, sensor_item
 
@@ -120,7 +125,9 @@ def test_every_bad_item_of_a_stream_is_answered_and_none_ends_it(fake_server, se
 
 def test_all_wrong_fields_are_named_at_once(fake_server, session):
     scan = LaserScan(angle_min_radians=NAN, ranges_meters=[])
-    error = refused(fake_server.mapping.AddLaserScan, mapping.AddLaserScanRequest(session_id=session, scan=scan))
+    error = refused(
+        fake_server.mapping.AddLaserScan, mapping.AddLaserScanRequest(session_id=session, scan=scan)
+    )
     assert set(error.violations) == {
         "scan.stamp",
         "scan.ranges_meters",

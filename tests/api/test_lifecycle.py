@@ -6,14 +6,13 @@ import threading
 import grpc
 import pytest
 from conftest import drive
-from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
-from grpc_health.v1.health_pb2_grpc import HealthStub
-from grpc_reflection.v1alpha.proto_reflection_descriptor_database import ProtoReflectionDescriptorDatabase
 from gridwright.v1 import mapping_service_pb2 as mapping
-
 from gridwright_client.errors import GridwrightRpcError
 from gridwright_server.address import AddressError, check
 from gridwright_server.app import start_server
+from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
+from grpc_health.v1.health_pb2_grpc import HealthStub
+from grpc_reflection.v1alpha.proto_reflection_descriptor_database import ProtoReflectionDescriptorDatabase
 
 SERVICES = ("", "gridwright.v1.SessionService", "gridwright.v1.MappingService")
 

@@ -9,7 +9,6 @@ from conftest import drive, scan_message
 from fake_mapper import SECRET, FakeSnapshot
 from gridwright.v1 import mapping_service_pb2 as mapping
 from gridwright.v1 import session_service_pb2 as pb
-
 from gridwright_client.errors import GridwrightRpcError
 from gridwright_server.config import MapperConfig
 
@@ -202,7 +201,11 @@ def test_internal_errors_tell_an_incident_and_nothing_else(fake_server, monkeypa
     monkeypatch.setattr(mapper, "trajectory", broken)
     monkeypatch.setattr(mapper, "map_snapshot", broken)
     monkeypatch.setattr(fake_server.server._parts.registry, "page", lambda *_: broken())
-    for call in (fake_server.client.trajectory, fake_server.client.map, lambda _: list(fake_server.client.list_sessions())):
+    for call in (
+        fake_server.client.trajectory,
+        fake_server.client.map,
+        lambda _: list(fake_server.client.list_sessions()),
+    ):
         with pytest.raises(GridwrightRpcError) as caught:
             call("a")
         assert caught.value.code is grpc.StatusCode.INTERNAL

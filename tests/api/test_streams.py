@@ -4,11 +4,10 @@ import threading
 
 import grpc
 import pytest
-from conftest import Feed, drive, scan_message
+from conftest import Feed, drive, scan_message, until_error
 from fake_mapper import BAD_STAMP_NS, SECRET
 from gridwright.v1 import mapping_service_pb2 as pb
 from gridwright.v1.sensor_pb2 import VERDICT_DUPLICATE, VERDICT_PROCESSED
-
 from gridwright_client.errors import GridwrightRpcError
 from gridwright_client.items import odometry, sensor_item
 from gridwright_server import app
@@ -92,15 +91,11 @@ def test_duplicates_are_not_applied_again(fake_server, session):
 
 
 def test_a_gap_is_named_after_the_verdicts_before_it(fake_server, session):
-    verdicts = []
-    with pytest.raises(GridwrightRpcError) as caught:
-        verdicts.extend(fake_server.client.stream(session, drive(3)))
-        for verdict in fake_server.client.stream(session, [*drive(2, first=4), *drive(1, first=7)]):
-            verdicts.append(verdict)  # noqa: PERF402
+    items = [*drive(5), *drive(1, first=7)]
+    verdicts, error = until_error(fake_server.client.stream(session, items))
     assert [verdict.sequence_number for verdict in verdicts] == [1, 2, 3, 4, 5]
-    assert caught.value.code is grpc.StatusCode.FAILED_PRECONDITION
-    assert caught.value.reason == "SEQUENCE_GAP"
-    assert caught.value.metadata["expected_sequence_number"] == "6"
+    assert (error.code, error.reason) == (grpc.StatusCode.FAILED_PRECONDITION, "SEQUENCE_GAP")
+    assert error.metadata["expected_sequence_number"] == "6"
 
 
 def test_two_streams_of_the_same_items_apply_each_once(fake_server, session):
@@ -152,11 +147,9 @@ def test_a_failing_items_source_is_the_clients_error(fake_server, session):
         yield from drive(5)
         raise OSError("the log ended early")
 
-    received = []
-    with pytest.raises(OSError, match="the log ended early"):
-        for verdict in fake_server.client.stream(session, items()):
-            received.append(verdict)  # noqa: PERF402
+    received, error = until_error(fake_server.client.stream(session, items()))
     assert len(received) == 5
+    assert str(error) == "the log ended early"
 
 
 def test_finished_and_unknown_sessions(fake_server, session):
@@ -195,14 +188,11 @@ def test_finish_drains_what_is_queued(fake_server, session, feed):
 
 def test_an_error_inside_fails_the_session_and_keeps_its_text(fake_server, session, caplog):
     items = [*drive(4), sensor_item(5, scan_message(BAD_STAMP_NS)), *drive(3, first=6)]
-    received = []
-    with pytest.raises(GridwrightRpcError) as caught:
-        for verdict in fake_server.client.stream(session, items):
-            received.append(verdict)  # noqa: PERF402
+    received, error = until_error(fake_server.client.stream(session, items))
     assert [verdict.sequence_number for verdict in received] == [1, 2, 3, 4]
-    assert caught.value.reason == "SESSION_FAILED"
-    assert SECRET not in str(caught.value)
-    assert caught.value.metadata["incident"] in caplog.text
+    assert error.reason == "SESSION_FAILED"
+    assert SECRET not in str(error)
+    assert error.metadata["incident"] in caplog.text
     assert SECRET in caplog.text
     assert fake_server.client.get_session(session).state == 3
     assert len(fake_server.client.trajectory(session).stamps_ns) == 2

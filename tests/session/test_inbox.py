@@ -3,7 +3,6 @@
 import threading
 
 import pytest
-
 from gridwright_server.errors import UnavailableError
 from gridwright_server.session.inbox import QUEUE_LIMIT, Inbox
 

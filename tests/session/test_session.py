@@ -6,7 +6,6 @@ from concurrent.futures import Future
 import numpy as np
 import pytest
 from fake_mapper import FakeMapper
-
 from gridwright_server.config import MapperConfig
 from gridwright_server.errors import FailedPreconditionError, GridwrightError, UnavailableError
 from gridwright_server.session.items import OdometryReading, SensorItem, SessionSpec
@@ -90,9 +89,11 @@ def test_close_refuses_what_waits(session, mapper):
     waiting = submit(session, scan())
     closing = threading.Thread(target=session.close, args=(stopping,))
     closing.start()
+    poll = threading.Event()
+    while session._inbox._closing is None:
+        poll.wait(0.005)
     with pytest.raises(UnavailableError):
-        while True:
-            session._inbox.check_open()
+        submit(session, scan())
     mapper.release()
     closing.join(10.0)
     assert at_hand.result(10.0)

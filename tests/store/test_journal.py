@@ -3,7 +3,6 @@
 import logging
 
 import pytest
-
 from gridwright_server.store.journal import JournalReader, JournalRefusedError, Record, RecordKind
 from gridwright_server.store.store import Store, StoreLockedError
 

@@ -9,7 +9,6 @@ from fake_mapper import BAD_STAMP_NS
 from gridwright.v1 import mapping_service_pb2 as mapping
 from gridwright.v1.geometry_pb2 import Pose2D
 from gridwright.v1.sensor_pb2 import LaserMounting
-
 from gridwright_client.errors import GridwrightRpcError
 from gridwright_client.items import sensor_item
 from gridwright_server.app import start_server

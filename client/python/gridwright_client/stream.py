@@ -21,6 +21,8 @@ class SensorStream:
         want_poses: bool,
         batch_size: int,
     ) -> None:
+        if batch_size < 1:
+            raise ValueError(f"batch_size is {batch_size}, must be at least 1")
         self._start = mapping.StreamStart(session_id=session_id, want_poses=want_poses)
         self._items = items
         self._batch_size = batch_size

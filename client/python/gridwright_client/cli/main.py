@@ -63,7 +63,7 @@ def _advice(name: str, error: ModuleNotFoundError) -> str:
     return f"the module {error.name} is missing: pip install '{requirement}'"
 
 
-@click.group(cls=EntryPointGroup)
-@click.version_option(package_name=_DISTRIBUTION)
+@click.group(cls=EntryPointGroup, name=_DISTRIBUTION)
+@click.version_option(package_name=_DISTRIBUTION, prog_name=_DISTRIBUTION)
 def main() -> None:
     """Gridwright: a mapping server for mobile robots."""
