@@ -24,7 +24,7 @@ class GridConfig:
     resolution_meters: float = bounded(0.04, 0.005, 1.0)
     coarse_factor: int = bounded(10, 2, 64)
     hit_log_odds: float = bounded(0.9, 0.01, 10.0)
-    free_log_odds: float = bounded(0.3, 0.01, 10.0)
+    free_log_odds: float = bounded(0.08, 0.01, 10.0)
     log_odds_limit: float = bounded(4.0, 0.1, 20.0)
 
 
@@ -38,18 +38,19 @@ class MotionConfig:
     translation_sigma_per_radian: float = bounded(0.05, 0.0, 10.0)
     rotation_sigma_per_meter: float = bounded(0.05, 0.0, 10.0)
     rotation_sigma_per_radian: float = bounded(0.1, 0.0, 10.0)
-    translation_sigma_floor_meters: float = bounded(0.02, 0.0001, 10.0)
-    rotation_sigma_floor_radians: float = bounded(0.01, 0.0001, math.pi)
+    translation_sigma_floor_meters: float = bounded(0.1, 0.0001, 10.0)
+    rotation_sigma_floor_radians: float = bounded(0.05, 0.0001, math.pi)
 
 
 @dataclass(frozen=True)
 class SensorConfig:
     """The observation model (4.20)."""
 
-    usable_range_meters: float = bounded(0.0, 0.0, 1000.0)
+    usable_range_meters: float = bounded(60.0, 0.1, 1000.0)
     hit_sigma_meters: float = bounded(0.06, 0.001, 10.0)
     outlier_probability: float = bounded(0.05, 0.0001, 0.9999)
-    likelihood_gain: float = bounded(0.1, 0.0001, 10.0)
+    likelihood_gain: float = bounded(2.0, 0.0001, 100.0)
+    weight_gain: float = bounded(1.0, 0.0, 100.0)
 
 
 @dataclass(frozen=True)

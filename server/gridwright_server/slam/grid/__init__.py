@@ -1,0 +1,1 @@
+"""Maps: tiles shared copy-on-write, occupancy, the likelihood field and its coarse level."""

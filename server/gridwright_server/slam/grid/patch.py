@@ -1,0 +1,80 @@
+"""The part of a particle's map that a search can reach, laid out densely.
+
+Lookups through a page table cost more than the copy of the tiles they would touch. A patch is a whole
+number of tiles; only the tiles that end points can fall in are filled, the rest is left as it was.
+"""
+
+import math
+
+from gridwright_server.jit import kernel
+from gridwright_server.slam.grid.tiles import NO_TILE
+
+
+@kernel
+def tiles_reached(points, pose, slack_m, slack_rad, tile_m, reached):
+    """Marks the tiles that end points can fall in, wherever in the window the pose is.
+
+    points: shape (returns, 2), in base_link; pose: map_from_base with x and y counted from the
+    patch's corner; slack: how far the pose may be from there. reached: shape (tile rows, tile columns).
+    """
+    reached[:] = False
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    for k in range(len(points)):
+        px, py = points[k, 0], points[k, 1]
+        x, y = pose[0] + c * px - s * py, pose[1] + s * px + c * py
+        slack = slack_m + slack_rad * math.hypot(px, py)
+        bottom = max(math.floor((y - slack) / tile_m), 0)
+        top = min(math.floor((y + slack) / tile_m) + 1, reached.shape[0])
+        left = max(math.floor((x - slack) / tile_m), 0)
+        right = min(math.floor((x + slack) / tile_m) + 1, reached.shape[1])
+        for i in range(bottom, top):
+            for j in range(left, right):
+                reached[i, j] = True
+
+
+@kernel
+def gather(tiles, table, reached, out):
+    """Copies the reached tiles of a page table side by side; zero where there is none.
+
+    tiles: shape (capacity, n, n); out: shape (table rows * n, table columns * n).
+    """
+    n = tiles.shape[1]
+    for tile_row in range(table.shape[0]):
+        for tile_column in range(table.shape[1]):
+            if not reached[tile_row, tile_column]:
+                continue
+            tile = table[tile_row, tile_column]
+            row0, column0 = tile_row * n, tile_column * n
+            if tile == NO_TILE:
+                for i in range(n):
+                    for j in range(n):
+                        out[row0 + i, column0 + j] = 0
+            else:
+                for i in range(n):
+                    for j in range(n):
+                        out[row0 + i, column0 + j] = tiles[tile, i, j]
+
+
+@kernel
+def reachable_maximum(blocks, block_cells, side, along, out):
+    """The coarse level: out[i, j] = maximum over all cells that a square reaches from block (i, j).
+
+    blocks: shape (rows, columns), uint8, the maximum of the field over each block of cells. A square
+    of `side` cells that starts within a block ends at most (block_cells - 1) + (side - 1) further.
+    along: scratch, shaped as blocks. What lies within reach of the last rows and columns is not
+    worked out: a patch is larger than what its end points fall in.
+    """
+    reach = (block_cells + side - 2) // block_cells + 1
+    rows, columns = blocks.shape
+    for i in range(rows):
+        for j in range(columns - reach + 1):
+            along[i, j] = blocks[i, j]
+        for k in range(1, reach):
+            for j in range(columns - reach + 1):
+                along[i, j] = max(along[i, j], blocks[i, j + k])
+    for i in range(rows - reach + 1):
+        for j in range(columns):
+            out[i, j] = along[i, j]
+        for k in range(1, reach):
+            for j in range(columns):
+                out[i, j] = max(out[i, j], along[i + k, j])
