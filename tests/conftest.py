@@ -136,5 +136,5 @@ def recorded_logs():
     default = Path(__file__).parents[2] / "shared" / "data"
     folder = Path(os.environ.get("GRIDWRIGHT_DATA", default))
     if not (folder / "intel" / "intel.clf").is_file():
-        pytest.skip(f"no recorded logs in {folder}: set GRIDWRIGHT_DATA to the folder that holds intel/intel.clf")
+        pytest.skip(f"no recorded logs in {folder}: GRIDWRIGHT_DATA names the folder of intel/intel.clf")
     return folder

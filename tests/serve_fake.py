@@ -1,6 +1,6 @@
 """`gridwright serve` with fake mappers.
 
-FAKE_WARM_UP=never keeps it warming up; FAKE_SCANS=never keeps every scan in the works.
+FAKE_WARM_UP=never keeps it warming up, =fails ends that; FAKE_SCANS=never keeps every scan in the works.
 """
 
 import functools
@@ -15,6 +15,8 @@ from gridwright_server import app
 def warm_up():
     if os.environ.get("FAKE_WARM_UP") == "never":
         threading.Event().wait()
+    if os.environ.get("FAKE_WARM_UP") == "fails":
+        raise RuntimeError("no compiler")
 
 
 def mapper(*arguments):

@@ -74,3 +74,34 @@ def test_unary_calls(fake_server, stub, method, request_type):
         fake_server.client.delete_session(session.session_id)
     fake_server.client.create_session("well")
     assert len(list(fake_server.client.stream("well", drive(10)))) == 10
+
+
+def test_stream_items(fake_server):
+    """Any item gets a verdict, and none ends the stream."""
+    fake_server.client.create_session("a")
+
+    @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+    @given(st.lists(messages(mapping.SensorItem), max_size=10))
+    def check(items):
+        first = fake_server.client.next_sequence_number("a")
+        for number, item in enumerate(items, start=first):
+            item.sequence_number = number
+        verdicts = list(fake_server.client.stream("a", items))
+        assert [verdict.sequence_number for verdict in verdicts] == [item.sequence_number for item in items]
+
+    check()
+    assert fake_server.client.get_session("a").state == sessions.SESSION_STATE_ACTIVE
+
+
+@pytest.mark.parametrize("method", ["SessionService/CreateSession", "MappingService/AddLaserScan"])
+def test_bytes_that_are_no_message(fake_server, method):
+    call = fake_server.channel.unary_unary(f"/gridwright.v1.{method}")
+
+    @settings(max_examples=150, deadline=None)
+    @given(st.binary(max_size=100))
+    def check(data):
+        # gRPC itself answers INTERNAL to what does not decode.
+        assert call.future(data, timeout=20.0).code() in ALLOWED | {grpc.StatusCode.INTERNAL}
+
+    check()
+    fake_server.client.wait_until_serving(5.0)

@@ -129,17 +129,21 @@ def test_what_was_taken_up_is_processed_when_the_client_vanishes(fake_server, se
     feed.put(batch(list(drive(QUEUE_LIMIT + 100))))
     next(call)
     assert mapper.entered.wait(DEADLINE_S)
+    watched = fake_server.server._parts.registry.get(session)
+    poll = threading.Event()
+    while len(watched._inbox._entries) < QUEUE_LIMIT:
+        poll.wait(0.005)
     call.cancel()
     feed.close()
     mapper.release()
-    watched = fake_server.server._parts.registry.get(session)
-    poll = threading.Event()
-    while sum((watched.counts.odometry_processed, len(mapper.scans))) < QUEUE_LIMIT + 100:
-        poll.wait(0.005)
     while fake_server.server._parts.streams._slots:
         poll.wait(0.005)
     while any(thread.name == "sensor-stream" for thread in threading.enumerate()):
         poll.wait(0.005)
+    fake_server.client.finish_session(session)
+    taken = watched.next_sequence_number - 1
+    assert taken >= QUEUE_LIMIT
+    assert watched.counts.odometry_processed + len(mapper.scans) == taken
 
 
 def test_a_failing_items_source_is_the_clients_error(fake_server, session):

@@ -99,6 +99,14 @@ def test_a_signal_while_warming_up(serve):
     assert server.end()[0] == 0
 
 
+def test_a_failed_start_up_ends_it_with_code_1(serve):
+    server = serve(environment={"FAKE_WARM_UP": "fails"})
+    _, err = server.process.communicate(timeout=20.0)
+    assert server.process.returncode == 1
+    assert "no compiler" in err
+    assert err.endswith("Error: the server could not start up: see the log\n")
+
+
 def test_a_taken_port_is_one_line_and_code_2(serve):
     server = serve().serving()
     line = refused("--address", server.address)

@@ -21,12 +21,16 @@ from gridwright_server.session.session import Session
 _MOST_UNANSWERED = 2 * LARGEST_BATCH
 
 
+class _AbandonedError(Exception):
+    """The client is gone."""
+
+
 class SensorStream:
     """Feeds one session from one client.
 
     Ends when the client has sent all and every verdict is delivered; or with an error, after the
-    verdicts of the items before it; or, when the client is gone, silently: what was taken up until
-    then is processed all the same.
+    verdicts of the items before it; or, when the client is gone, silently: what the session's queue
+    has taken up by then is processed all the same, and the client will be told where to go on.
     """
 
     def __init__(
@@ -71,7 +75,7 @@ class SensorStream:
             for request in self._requests:
                 for message in batch_of(request).items:
                     self._submit(message)
-        except grpc.RpcError:
+        except (grpc.RpcError, _AbandonedError):
             self.abandon()
         except Exception as error:  # raised by `responses`, after the verdicts that are still to come
             self._error = self._error or error
@@ -85,6 +89,8 @@ class SensorStream:
                 self._changed.wait()
         if self._error is not None:
             raise self._error
+        if self._ended:
+            raise _AbandonedError
         item = stream_item(message, self._session.spec.base_from_laser)
         self._session.submit(item, self._deliver)
         with self._changed:
