@@ -1,32 +1,20 @@
 """`gridwright replay`: a recorded log through a mapping server, and a map out of it."""
 
-import signal
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 import click
-import grpc
 from gridwright.v1.session_service_pb2 import MapperConfig
 from rich.console import Console
 
 from gridwright_client.carmen import CarmenLog, read_log
 from gridwright_client.cli.options import console, fail, os_error_text
-from gridwright_client.client import MappingClient
-from gridwright_client.errors import GridwrightRpcError
-from gridwright_client.local_server import ServerNotInstalledError, local_server
+from gridwright_client.cli.replay_session import map_events
 from gridwright_client.replay.config import ConfigError, read_config
 from gridwright_client.replay.events import Event, NoOdometryError, events_of, robot_seconds
-from gridwright_client.replay.mapping import Mapped, ReplayOptions, replay_events
-from gridwright_client.replay.progress import ReplayProgress
+from gridwright_client.replay.mapping import ReplayOptions
 from gridwright_client.replay.report import ReplayRun, write_outputs
-
-_CONNECT_TIMEOUT_S = 10.0
-_WARM_UP_TIMEOUT_S = 600.0
 
 
 def _speed(ctx: click.Context, param: click.Parameter, value: str) -> float | None:
@@ -88,7 +76,7 @@ def replay(
     directory = _made_directory(out or Path("out") / name)
     _tell_about(to, name, content)
     options = ReplayOptions(config, seed, times_real_time)
-    mapped, interrupted = _map(to, server, threads, content, events, options)
+    mapped, interrupted = map_events(to, server, threads, content, events, options)
     replayed = events[: mapped.tally.items]
     if mapped.tally.newest is None:
         fail(f"the server took up none of the log's scans: {dict(mapped.tally.scans) or 'none were sent'}")
@@ -159,72 +147,6 @@ def _tell_about(to: Console, name: str, log: CarmenLog) -> None:
     if log.malformed:
         first = log.malformed[0]
         to.print(f"{len(log.malformed)} malformed lines, the first: line {first.line_number}: {first.reason}")
-
-
-def _map(
-    to: Console,
-    address: str | None,
-    threads: int | None,
-    log: CarmenLog,
-    events: list[Event],
-    options: ReplayOptions,
-) -> tuple[Mapped, bool]:
-    stop = threading.Event()
-    with ExitStack() as stack:
-        try:
-            at = stack.enter_context(nullcontext(address) if address else local_server(threads))
-        except ServerNotInstalledError as error:
-            fail(str(error))
-        client = stack.enter_context(_connected(to, at))
-        progress = stack.enter_context(ReplayProgress(to, len(log.scans), robot_seconds(events)))
-        stack.enter_context(_interrupt_sets(stop))
-        try:
-            mapped = replay_events(
-                client, events, log.base_from_laser, options, stop=stop, on_progress=progress.update
-            )
-        except GridwrightRpcError as error:
-            fail(_rpc_error_text(error, at))
-    return mapped, stop.is_set()
-
-
-@contextmanager
-def _connected(to: Console, address: str) -> Iterator[MappingClient]:
-    """A client of a server that serves: a fresh one compiles for a minute or two first."""
-    with grpc.insecure_channel(address) as channel:
-        try:
-            grpc.channel_ready_future(channel).result(_CONNECT_TIMEOUT_S)
-        except grpc.FutureTimeoutError:
-            fail(f"no server answers at {address}: start one with `gridwright serve`, or leave out --server")
-    with MappingClient(address) as client:
-        try:
-            with to.status("waiting for the server to be warm (its first start compiles for a minute)"):
-                client.wait_until_serving(_WARM_UP_TIMEOUT_S)
-        except GridwrightRpcError as error:
-            fail(_rpc_error_text(error, address))
-        yield client
-
-
-@contextmanager
-def _interrupt_sets(stop: threading.Event) -> Iterator[None]:
-    """The first Ctrl-C sets the event; the second one aborts, as usual."""
-
-    def handle(number: int, frame: FrameType | None) -> None:
-        stop.set()
-        signal.signal(signal.SIGINT, previous)
-
-    previous = signal.getsignal(signal.SIGINT)
-    signal.signal(signal.SIGINT, handle)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, previous)
-
-
-def _rpc_error_text(error: GridwrightRpcError, address: str) -> str:
-    if error.violations:
-        listed = "; ".join(f"{field}: {what}" for field, what in error.violations.items())
-        return f"the server does not accept the replay's settings: {listed}"
-    return f"the server at {address} failed: {error}"
 
 
 def _tell_outcome(to: Console, report: dict[str, Any], directory: Path) -> None:
