@@ -2,12 +2,12 @@
 
 import grpc
 import pytest
-from conftest import drive
 from google.protobuf.descriptor import FieldDescriptor
 from gridwright.v1 import mapping_service_pb2 as mapping
 from gridwright.v1 import session_service_pb2 as sessions
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support import drive
 
 INTEGERS = st.one_of(st.integers(0, 5), st.integers(0, 2**31 - 1))
 NUMBERS = st.one_of(st.floats(-5.0, 5.0), st.floats(), st.just(0.0))

@@ -4,7 +4,6 @@ import math
 
 import grpc
 import pytest
-from conftest import SECOND_NS, scan_message
 from google.protobuf.timestamp_pb2 import Timestamp
 from gridwright.v1 import mapping_service_pb2 as mapping
 from gridwright.v1 import session_service_pb2 as pb
@@ -18,6 +17,7 @@ from gridwright.v1.sensor_pb2 import (
 )
 from gridwright_client.errors import GridwrightRpcError
 from gridwright_client.items import odometry, sensor_item
+from support import SECOND_NS, scan_message
 
 NAN, INF = math.nan, math.inf
 

@@ -5,7 +5,6 @@ import threading
 
 import grpc
 import pytest
-from conftest import drive
 from gridwright.v1 import mapping_service_pb2 as mapping
 from gridwright_client.errors import GridwrightRpcError
 from gridwright_server.address import AddressError, check
@@ -13,6 +12,7 @@ from gridwright_server.app import start_server
 from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
 from grpc_health.v1.health_pb2_grpc import HealthStub
 from grpc_reflection.v1alpha.proto_reflection_descriptor_database import ProtoReflectionDescriptorDatabase
+from support import drive
 
 SERVICES = ("", "gridwright.v1.SessionService", "gridwright.v1.MappingService")
 

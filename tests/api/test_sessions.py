@@ -5,12 +5,12 @@ import threading
 import grpc
 import numpy as np
 import pytest
-from conftest import drive, scan_message
 from fake_mapper import SECRET, FakeSnapshot
 from gridwright.v1 import mapping_service_pb2 as mapping
 from gridwright.v1 import session_service_pb2 as pb
 from gridwright_client.errors import GridwrightRpcError
 from gridwright_server.config import MapperConfig
+from support import drive, scan_message
 
 LARGEST_MAP_MESSAGE = 1 << 20
 

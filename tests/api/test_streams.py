@@ -4,7 +4,6 @@ import threading
 
 import grpc
 import pytest
-from conftest import Feed, drive, scan_message, until_error
 from fake_mapper import BAD_STAMP_NS, SECRET
 from gridwright.v1 import mapping_service_pb2 as pb
 from gridwright.v1.sensor_pb2 import VERDICT_DUPLICATE, VERDICT_PROCESSED
@@ -12,6 +11,7 @@ from gridwright_client.errors import GridwrightRpcError
 from gridwright_client.items import odometry, sensor_item
 from gridwright_server import app
 from gridwright_server.session.inbox import QUEUE_LIMIT
+from support import Feed, drive, scan_message, until_error
 
 DEADLINE_S = 20.0
 

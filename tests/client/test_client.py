@@ -6,12 +6,12 @@ import threading
 import grpc
 import numpy as np
 import pytest
-from conftest import SECOND_NS, Feed, drive
 from fake_mapper import FakeMapper
 from gridwright_client.client import MappingClient
 from gridwright_client.errors import GridwrightRpcError
 from gridwright_server.address import check
 from gridwright_server.app import start_server
+from support import SECOND_NS, Feed, drive
 
 
 def test_scans_and_odometry_one_by_one(fake_server):

@@ -9,11 +9,11 @@ from pathlib import Path
 import grpc
 import numpy as np
 import pytest
-from conftest import Feed, drive
 from gridwright_client.client import MappingClient
 from gridwright_client.errors import GridwrightRpcError
 from grpc_health.v1.health_pb2 import HealthCheckRequest, HealthCheckResponse
 from grpc_health.v1.health_pb2_grpc import HealthStub
+from support import SECOND_NS, Feed, drive
 
 FAKE = [sys.executable, str(Path(__file__).parents[1] / "serve_fake.py")]
 REAL = [str(Path(sys.executable).with_name("gridwright"))]
@@ -179,18 +179,28 @@ def test_a_second_signal_ends_it_at_once(stuck):
 
 
 def test_the_real_command(serve, tmp_path):
-    """With the kernels compiled: a scan gives a pose and a map, and SIGTERM ends it with 0."""
+    """With the kernels compiled: scans give a pose and a map, which outlive kill -9; SIGTERM gives 0."""
     server = serve("--data-dir", tmp_path, command=REAL)
     with MappingClient(server.address) as client:
         client.wait_until_serving(280.0)
         client.create_session("a")
-        client.add_odometry("a", 0, 0.0, 0.0, 0.0)
-        client.add_scan(
-            "a", 0, np.full(181, 3.0), angle_min_rad=-np.pi / 2, angle_increment_rad=np.pi / 180,
-            range_min_m=0.1, range_max_m=20.0,
-        )  # fmt: skip
-        assert client.pose("a").particle_count == 30
-        grid = client.map("a")
-        assert (grid.cells > 50).any()
-        assert ((grid.cells >= 0) & (grid.cells < 50)).any()
-    assert server.end()[0] == 0
+        for step in range(5):
+            client.add_odometry("a", step * SECOND_NS, 0.3 * step, 0.0, 0.1 * step)
+            client.add_scan(
+                "a", step * SECOND_NS, np.full(181, 3.0), angle_min_rad=-np.pi / 2,
+                angle_increment_rad=np.pi / 180, range_min_m=0.1, range_max_m=20.0,
+            )  # fmt: skip
+        pose, grid, trajectory = client.pose("a"), client.map("a"), client.trajectory("a")
+    assert len(trajectory.poses) == 5
+    assert (grid.cells > 50).any()
+    assert ((grid.cells >= 0) & (grid.cells < 50)).any()
+    server.process.kill()
+    server.process.communicate()
+
+    again = serve("--data-dir", tmp_path, command=REAL)
+    with MappingClient(again.address) as client:
+        client.wait_until_serving(280.0)
+        assert client.pose("a") == pose
+        np.testing.assert_array_equal(client.map("a").cells, grid.cells)
+        np.testing.assert_array_equal(client.trajectory("a").poses, trajectory.poses)
+    assert again.end()[0] == 0

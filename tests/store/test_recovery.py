@@ -4,7 +4,6 @@ import logging
 
 import grpc
 import pytest
-from conftest import drive, scan_message
 from fake_mapper import BAD_STAMP_NS
 from gridwright.v1 import mapping_service_pb2 as mapping
 from gridwright.v1.geometry_pb2 import Pose2D
@@ -13,6 +12,7 @@ from gridwright_client.errors import GridwrightRpcError
 from gridwright_client.items import sensor_item
 from gridwright_server.app import start_server
 from gridwright_server.store.store import StoreLockedError
+from support import drive, scan_message
 
 
 @pytest.fixture
