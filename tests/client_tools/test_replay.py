@@ -21,6 +21,7 @@ from gridwright_client.replay.events import (
     robot_seconds,
     sensor_items,
 )
+from gridwright_client.replay.window import SendingWindow
 from gridwright_client.trajectory_file import read_trajectory
 
 
@@ -159,7 +160,7 @@ def test_scans_without_any_odometry_cannot_be_mapped(tmp_path):
 
 def test_two_lasers_are_told_apart(tmp_path):
     found = events(tmp_path, flaser([1.0] * 4), flaser([2.0] * 4, name="RLASER"))
-    items = list(sensor_items(found, threading.Event(), None))
+    items = list(sensor_items(found, SendingWindow(threading.Event()), None))
     scans = [item.scan for item in items if item.HasField("scan")]
     assert [scan.sensor_id for scan in scans] == ["front", "rear"]
     assert all(isinstance(scan, LaserScan) for scan in scans)
@@ -168,6 +169,20 @@ def test_two_lasers_are_told_apart(tmp_path):
 
 def test_robot_time_is_from_the_earliest_to_the_latest_stamp(tmp_path):
     assert robot_seconds(events(tmp_path, *(odom(seconds=s) for s in ("7.0", "6.5", "9.0")))) == 2.5
+
+
+def test_a_sender_does_not_run_far_ahead_of_the_answers(tmp_path):
+    found = events(tmp_path, *(odom() for _ in range(600)))
+    window = SendingWindow(threading.Event())
+    items = sensor_items(found, window, None)
+    assert len([next(items) for _ in range(512)]) == 512
+    late = threading.Timer(0.2, window.answered)
+    late.start()
+    started_s = time.monotonic()
+    assert next(items).sequence_number == 513
+    assert time.monotonic() - started_s > 0.1
+    window.close()
+    assert list(items) == []
 
 
 def assert_one_line(result, *parts):

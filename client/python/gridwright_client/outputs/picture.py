@@ -13,7 +13,6 @@ from gridwright_client.results import OccupancyMap
 from gridwright_client.se2 import Poses
 
 _LONGEST_SIDE_PX = 2200
-_ENLARGED_SIDE_PX = 1800
 _MARGIN_CELLS = 10
 
 _UNKNOWN_GREY = 212
@@ -59,7 +58,7 @@ def _map_image(grid: OccupancyMap) -> tuple[Image.Image, View]:
     grey = _grey(grid.cells)[::-1]
     if shrink > 1:
         grey = _darkest(grey, shrink)
-    enlarge = max(1, _ENLARGED_SIDE_PX // max(grey.shape))
+    enlarge = max(1, _LONGEST_SIDE_PX // max(grey.shape))
     image = Image.fromarray(np.ascontiguousarray(grey)).convert("RGB")
     if enlarge > 1:  # whole cells, so that edges stay crisp
         image = image.resize((image.width * enlarge, image.height * enlarge), Image.Resampling.NEAREST)

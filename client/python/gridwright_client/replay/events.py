@@ -1,6 +1,5 @@
 """What a log's readings become on the way to the server."""
 
-import threading
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,9 +11,8 @@ from numpy.typing import NDArray
 
 from gridwright_client import items
 from gridwright_client.carmen import CarmenLog, LaserReading, OdometryReading
+from gridwright_client.replay.window import SendingWindow
 from gridwright_client.se2 import Poses, interpolate
-
-_LONGEST_SLEEP_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,27 +98,22 @@ def robot_seconds(events: Sequence[Event]) -> float:
 
 
 def sensor_items(
-    events: Sequence[Event], stop: threading.Event, times_real_time: float | None
+    events: Sequence[Event], window: SendingWindow, times_real_time: float | None
 ) -> Iterator[SensorItem]:
-    """The events as messages, each at its time; ends early once `stop` is set.
+    """The events as messages, as far as the window lets them.
 
-    `times_real_time` paces by the events' stamps; None = as fast as they are taken.
+    `times_real_time` paces by the events' stamps; None = as fast as they are answered.
     """
     started_s = time.monotonic()
     first_ns = events[0].stamp_ns if events else 0
     for sequence_number, event in enumerate(events, start=1):
         if times_real_time is not None:
             due_s = started_s + (event.stamp_ns - first_ns) * 1e-9 / times_real_time
-            _sleep_until(due_s, stop)
-        if stop.is_set():
+            while window.is_open and (remaining_s := due_s - time.monotonic()) > 0.0:
+                window.sleep(remaining_s)
+        if not window.take():
             return
         yield items.sensor_item(sequence_number, _message(event))
-
-
-def _sleep_until(due_s: float, stop: threading.Event) -> None:
-    while (remaining_s := due_s - time.monotonic()) > 0.0:
-        if stop.wait(min(remaining_s, _LONGEST_SLEEP_S)):
-            return
 
 
 def _message(event: Event) -> LaserScan | Odometry:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from gridwright_client.client import MappingClient
 from gridwright_client.replay.events import Event, ScanEvent, sensor_items
+from gridwright_client.replay.window import SendingWindow
 from gridwright_client.results import OccupancyMap
 from gridwright_client.se2 import Poses, between, compose
 from gridwright_client.trajectory_file import TimedPoses
@@ -82,17 +83,8 @@ def replay_events(
         LaserMounting(sensor_id=sensor_id, pose=_pose2d(pose)) for sensor_id, pose in base_from_laser.items()
     ]
     session_id = client.create_session(config=options.config, seed=options.seed, lasers=lasers).session_id
-    tally = Tally()
     started_s = time.perf_counter()
-    verdicts = client.stream(
-        session_id,
-        sensor_items(events, stop, options.times_real_time),
-        want_poses=True,
-        batch_size=_BATCH_SIZE if options.times_real_time is None else 1,
-    )
-    for verdict in verdicts:
-        _count(verdict, isinstance(events[verdict.sequence_number - 1], ScanEvent), tally)
-        on_progress(tally)
+    tally = _stream(client, session_id, events, options, SendingWindow(stop), on_progress)
     session = client.finish_session(session_id)
     wall_s = time.perf_counter() - started_s
     scans = [event for event in events[: tally.items] if isinstance(event, ScanEvent)]
@@ -107,6 +99,31 @@ def replay_events(
         online=_completed(scans, accepted, np.array([tally.online[index] for index in accepted.tolist()])),
         odometry=TimedPoses(_stamps_ns(scans), _odometry(scans)),
     )
+
+
+def _stream(
+    client: MappingClient,
+    session_id: str,
+    events: Sequence[Event],
+    options: ReplayOptions,
+    window: SendingWindow,
+    on_progress: Callable[[Tally], None],
+) -> Tally:
+    tally = Tally()
+    verdicts = client.stream(
+        session_id,
+        sensor_items(events, window, options.times_real_time),
+        want_poses=True,
+        batch_size=_BATCH_SIZE if options.times_real_time is None else 1,
+    )
+    try:
+        for verdict in verdicts:
+            window.answered()
+            _count(verdict, isinstance(events[verdict.sequence_number - 1], ScanEvent), tally)
+            on_progress(tally)
+    finally:
+        window.close()
+    return tally
 
 
 def _count(answer: ItemVerdict, is_scan: bool, tally: Tally) -> None:

@@ -1,11 +1,12 @@
 """How far a replay is: a live bar on a terminal, now and then a line elsewhere."""
 
+import math
 import time
 from types import TracebackType
 from typing import Self
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
 from gridwright_client.replay.mapping import Tally
 
@@ -23,10 +24,9 @@ class ReplayProgress:
         self._started_s = time.monotonic()
         self._due_s = self._started_s + (_REFRESH_S if console.is_terminal else _LINE_EVERY_S)
         self._bar = Progress(
-            BarColumn(bar_width=24),
+            BarColumn(bar_width=12),
             TaskProgressColumn(),
             TextColumn("{task.description}"),
-            TimeRemainingColumn(compact=True),
             console=console,
             transient=True,
             disable=not console.is_terminal,
@@ -56,16 +56,15 @@ class ReplayProgress:
             self._bar.update(self._task, completed=tally.scan_count, description=text)
         else:
             self._due_s = now_s + _LINE_EVERY_S
-            self._console.print(f"{tally.scan_count}/{self._scan_count} scans, {text}")
+            self._console.print(f"{tally.scan_count}/{self._scan_count} scans  {text}")
 
     def _text(self, tally: Tally, wall_s: float) -> str:
+        """Short enough for a terminal of 80 columns, beside a bar."""
         share = tally.scan_count / max(self._scan_count, 1)
-        parts = [
-            f"{tally.scan_count / wall_s:.0f} scans/s",
-            f"{share * self._robot_s / wall_s:.0f} x real time",
-        ]
+        parts = [f"{tally.scan_count / wall_s:.0f} scans/s", f"{share * self._robot_s / wall_s:.0f}x"]
         if tally.newest is not None:
             pose, newest = tally.newest.pose, tally.newest
             parts.append(f"Neff {newest.effective_sample_size:.1f}/{newest.particle_count}")
-            parts.append(f"at ({pose.x_meters:.2f}, {pose.y_meters:.2f}) m, {pose.theta_radians:+.2f} rad")
-        return ", ".join(parts)
+            degrees = math.degrees(pose.theta_radians)
+            parts.append(f"({pose.x_meters:.1f}, {pose.y_meters:.1f}) m {degrees:+.0f}°")
+        return "  ".join(parts)
