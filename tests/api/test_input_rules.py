@@ -52,6 +52,7 @@ BAD_SCANS = [
     ("scan.angle_min_radians", {"angle_min_radians": -90.0}),
     ("scan.angle_increment_radians", {"angle_increment_radians": 0.0}),
     ("scan.angle_increment_radians", {"angle_increment_radians": NAN}),
+    ("scan.angle_increment_radians", {"angle_increment_radians": INF}),
     ("scan.angle_increment_radians", {"angle_increment_radians": 1e300}),
     ("scan.range_min_meters", {"range_min_meters": NAN}),
     ("scan.range_min_meters", {"range_min_meters": -0.1}),

@@ -22,10 +22,9 @@ Lasers = Mapping[str, Pose]
 def scan_request_item(request: pb.AddLaserScanRequest, lasers: Lasers) -> SensorItem:
     """The scan of a unary call; raises InvalidArgumentError."""
     checks = Checks()
-    if not checks.present(request, "", "scan"):
+    scan = _scan(request.scan, lasers, checks) if checks.present(request, "", "scan") else None
+    if scan is None:
         raise InvalidArgumentError(checks.violations)
-    scan = _scan(request.scan, lasers, checks)
-    checks.raise_if_any()
     return SensorItem(scan, pb.SensorItem(scan=request.scan).SerializeToString)
 
 
@@ -87,22 +86,24 @@ def _data(message: pb.SensorItem, lasers: Lasers) -> Scan | OdometryReading | In
     return InvalidData(tuple(checks.violations)) if checks.violations or data is None else data
 
 
-def _scan(message: LaserScan, lasers: Lasers, checks: Checks) -> Scan:
-    """Ranges may hold NaN and Inf (REP-117); everything else must be sound."""
+def _scan(message: LaserScan, lasers: Lasers, checks: Checks) -> Scan | None:
+    """None where a rule is broken. Ranges may hold NaN and Inf (REP-117), nothing else may."""
     beams = len(message.ranges_meters)
     if not 1 <= beams <= _MOST_BEAMS:
         checks.report("scan.ranges_meters", f"holds {beams} ranges, must hold 1 to {_MOST_BEAMS}")
     stamp_ns = checks.stamp_ns(message, "scan.")
     _check_geometry(message, checks)
-    ranges = np.array(message.ranges_meters, dtype=np.float64)
+    base_from_laser = _mounting(message.sensor_id, lasers, checks)
+    if checks.violations:
+        return None
     steps = np.arange(beams, dtype=np.float64)
     return Scan(
         stamp_ns=stamp_ns,
         bearings_rad=message.angle_min_radians + message.angle_increment_radians * steps,
-        ranges_m=ranges,
+        ranges_m=np.array(message.ranges_meters, dtype=np.float64),
         range_min_m=message.range_min_meters,
         range_max_m=message.range_max_meters,
-        base_from_laser=_mounting(message.sensor_id, lasers, checks),
+        base_from_laser=base_from_laser,
     )
 
 
