@@ -37,6 +37,8 @@ class OdometryBuffer:
         newer = self._readings[-1]
         older = self._readings[-2]
         if stamp_ns > max(newer[0], older[0]):
+            if newer[0] <= older[0]:  # the clock stepped back: there is no speed to go on at
+                return newer[1]
             ahead_ns = min(stamp_ns, newer[0] + EXTRAPOLATION_LIMIT_NS)
             return _on_the_way(older, newer, ahead_ns)
         for older in _backwards(self._readings):
