@@ -26,9 +26,8 @@ def grow(rng, particles, updates, resample_probability, spread=2.0):
 @pytest.mark.parametrize("resample_probability", [0.0, 0.05, 0.5, 1.0])
 def test_no_path_is_changed_by_collapsing(particles, resample_probability):
     rng = np.random.default_rng([particles, int(100 * resample_probability)])
-    updates = 0
-    for ancestry, history in grow(rng, particles, 5 * COLLAPSE_EVERY + 7, resample_probability):
-        updates += 1
+    growing = grow(rng, particles, 5 * COLLAPSE_EVERY + 7, resample_probability)
+    for updates, (ancestry, history) in enumerate(growing, start=1):
         assert len(ancestry) == updates
         if updates % 13 == 0 or updates % COLLAPSE_EVERY < 3:
             for particle in range(particles):
@@ -46,8 +45,7 @@ def test_what_all_share_is_kept_once():
 
 
 def test_nothing_is_given_up_while_lines_differ():
-    for ancestry, _ in grow(np.random.default_rng(5), 3, 3 * COLLAPSE_EVERY, 0.0):
-        pass
+    *_, (ancestry, _) = grow(np.random.default_rng(5), 3, 3 * COLLAPSE_EVERY, 0.0)
     assert not ancestry._settled
 
 

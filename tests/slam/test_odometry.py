@@ -1,5 +1,6 @@
 """The odometry pose at a scan's time."""
 
+import itertools
 import math
 
 import numpy as np
@@ -98,7 +99,7 @@ def test_after_a_step_back_nobody_drives_backwards(step_back_ms):
 @given(st.lists(st.integers(0, 30), min_size=2, max_size=12), st.integers(0, 30))
 def test_any_order_of_stamps_agrees_with_looking_at_every_pair(stamps_ms, at_ms):
     readings = [(ms * MS, np.array((float(k), 0.0, 0.0))) for k, ms in enumerate(stamps_ms)]
-    spans = [(a, b) for a, b in zip(stamps_ms, stamps_ms[1:], strict=False)]
+    spans = list(itertools.pairwise(stamps_ms))
     around = [k for k, (a, b) in enumerate(spans) if min(a, b) <= at_ms <= max(a, b)]
     actual = buffer_of(*readings).at(at_ms * MS)
     if around and at_ms <= max(stamps_ms[-2:]):  # else it is beyond the newest

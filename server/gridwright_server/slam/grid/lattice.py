@@ -27,6 +27,8 @@ class Box(NamedTuple):
         """The smallest box that holds both; an empty one adds nothing."""
         if self.tiles == 0:
             return other
+        if other.tiles == 0:
+            return self
         return Box(
             min(self.row_begin, other.row_begin),
             min(self.column_begin, other.column_begin),
