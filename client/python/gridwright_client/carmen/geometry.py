@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from gridwright_client.carmen.messages import DeclaredBeams
-from gridwright_client.carmen.readings import FRONT, REAR, BeamGeometry
+from gridwright_client.carmen.readings import REAR, BeamGeometry
 from gridwright_client.se2 import Poses, wrap
 
-_NAMES = {FRONT: "front", REAR: "rear"}
 _LARGEST_MOUNTING_M = 2.0
 _MOUNTING_AGREEMENT_M = 0.02
 _MOUNTING_AGREEMENT_RAD = 0.02
@@ -25,8 +24,7 @@ def beam_geometry(
     """
     if declared is not None:
         return BeamGeometry(declared.start_angle_rad, _declared_increment(beams, declared), beams)
-    name = _NAMES[sensor_id]
-    resolution_deg = parameter(parameters, f"laser_{name}_laser_resolution")
+    resolution_deg = parameter(parameters, f"laser_{sensor_id}_laser_resolution")
     if resolution_deg is not None and resolution_deg > 0.0:
         increment = math.radians(resolution_deg)
     else:
@@ -53,10 +51,9 @@ def mounting(
     centre = _agreed(measured)
     if posed_by_message and centre is not None:
         return centre
-    name = _NAMES[sensor_id]
-    forward = parameter(parameters, f"robot_{name}laser_offset")
-    left = parameter(parameters, f"robot_{name}laser_side_offset")
-    turn_deg = parameter(parameters, f"robot_{name}laser_angular_offset")
+    forward = parameter(parameters, f"robot_{sensor_id}laser_offset")
+    left = parameter(parameters, f"robot_{sensor_id}laser_side_offset")
+    turn_deg = parameter(parameters, f"robot_{sensor_id}laser_angular_offset")
     default_turn_deg = 180.0 if sensor_id == REAR else 0.0
     is_named = (forward, left, turn_deg) != (None, None, None)
     # Some programs wrote the robot's pose for the rear laser's: one that looks forward is not believed.

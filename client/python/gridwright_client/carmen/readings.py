@@ -10,6 +10,7 @@ from gridwright_client.se2 import Poses
 
 FRONT = "front"
 REAR = "rear"
+"""The lasers' names, in parameters too: `robot_frontlaser_offset`, `robot_rear_laser_max`."""
 
 
 @dataclass(frozen=True)
