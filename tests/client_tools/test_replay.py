@@ -105,11 +105,14 @@ def test_paced_replays_take_their_time(fake_server, tmp_path):
 
 def test_an_interrupt_writes_what_has_been_mapped(fake_server, tmp_path):
     def interrupt():
-        while not fake_server.mappers or len(fake_server.mappers[0].scans) < 3:
+        deadline_s = time.monotonic() + 20.0
+        while time.monotonic() < deadline_s:
+            if fake_server.mappers and len(fake_server.mappers[0].scans) >= 3:
+                os.kill(os.getpid(), signal.SIGINT)
+                return
             time.sleep(0.01)
-        os.kill(os.getpid(), signal.SIGINT)
 
-    threading.Thread(target=interrupt).start()
+    threading.Thread(target=interrupt, daemon=True).start()
     result, report = replay_made(fake_server, tmp_path, "--speed", 1, scans=600)
     assert "Interrupted" in result.output
     assert report["interrupted"]

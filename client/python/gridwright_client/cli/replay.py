@@ -146,7 +146,9 @@ def _tell_about(to: Console, name: str, log: CarmenLog) -> None:
         to.print(f"not read: {ignored}")
     if log.malformed:
         first = log.malformed[0]
-        to.print(f"{len(log.malformed)} malformed lines, the first: line {first.line_number}: {first.reason}")
+        to.print(
+            f"malformed lines: {len(log.malformed)}, the first is line {first.line_number}: {first.reason}"
+        )
 
 
 def _tell_outcome(to: Console, report: dict[str, Any], directory: Path) -> None:

@@ -12,7 +12,7 @@ from gridwright_client.outputs.page import END, START, View, draw_mark, frame_pa
 from gridwright_client.results import OccupancyMap
 from gridwright_client.se2 import Poses
 
-_LONGEST_SIDE_PX = 2200
+_LONGEST_SIDE_PX = 2100
 _MARGIN_CELLS = 10
 
 _UNKNOWN_GREY = 212
@@ -25,7 +25,7 @@ _SUPERSAMPLING = 2
 def draw_map(grid: OccupancyMap, path: Poses, title: str, target: Path) -> None:
     """Writes a PNG of the observed part of the map with the path, shape (n, 3), drawn over it.
 
-    Its drawing area is at most 2200 pixels long; a map of more cells is reduced so that walls stay.
+    Its drawing area is at most 2100 pixels long; a map of more cells is reduced so that walls stay.
     """
     image, view = _map_image(_with_margin(grid))
     if len(path):
