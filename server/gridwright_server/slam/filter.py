@@ -123,7 +123,9 @@ class ParticleFilter:
 
     def _draw(self) -> tuple[NDArray[np.float64], float]:
         """Standard normal draws, shape (particles, 3), and where the resampling comb starts."""
-        generator = np.random.Generator(np.random.Philox(key=[self._seed, self.updates]))
+        # As a list, a seed above 2^63 would become a float64, and near-by seeds the same.
+        key = np.array((self._seed, self.updates), np.uint64)
+        generator = np.random.Generator(np.random.Philox(key=key))
         draws = generator.standard_normal((len(self.poses), 3))
         return np.clip(draws, -DRAW_LIMIT, DRAW_LIMIT), generator.random()
 
@@ -241,9 +243,10 @@ def _quarter(coarse_factor: int) -> int:
 
 def _window_of(config: MapperConfig) -> Window:
     matching, factor = config.matching, config.grid.coarse_factor
+    voxel_m = config.grid.resolution_meters * factor
     # Rounded up to whole voxels and steps; the small number forgives binary fractions.
     return Window(
-        math.ceil(matching.window_meters / (config.grid.resolution_meters * factor) - 1e-9),
+        max(math.ceil(matching.window_meters / voxel_m - 1e-9), 1),
         math.ceil(matching.window_radians / matching.angle_step_radians - 1e-9),
         matching.angle_step_radians,
         factor,
