@@ -15,8 +15,10 @@ from gridwright_server.config import (
     SensorConfig,
 )
 from gridwright_server.slam import se2
+from gridwright_server.slam.grid.tiles import NO_TILE
 from gridwright_server.slam.mapper import REVERSAL_TOLERANCE_NS, Mapper
 from gridwright_server.slam.types import Scan, Verdict
+from naive.one_map import field_of
 from simulated_room import (
     BACKWARDS,
     FRONT,
@@ -31,6 +33,7 @@ from simulated_room import (
 
 CONFIG = MapperConfig(particles=6)
 STEPS = 30
+BLURRED = SensorConfig(hit_sigma_meters=3.0)
 
 
 @pytest.fixture(scope="module")
@@ -374,6 +377,40 @@ class TestSnapshots:
         assert len(fingerprint(plain)) > 0
 
 
+@pytest.mark.parametrize(
+    "config",
+    [
+        CONFIG,
+        replace(CONFIG, grid=GridConfig(resolution_meters=0.2, coarse_factor=2), sensor=BLURRED),
+    ],
+    ids=["default", "walls blurred far"],
+)
+def test_every_particles_field_is_that_of_its_surfaces(workers, config):
+    """Also where a wall's field reaches farther than the search looks."""
+    mapper = Mapper(config, 1, workers, 2)
+    poses = drive(10)
+    feed(mapper, poses, drifting(poses))
+    particles, resolution_m = mapper._filter, config.grid.resolution_meters
+    n = particles.pool.tile_cells
+    for table in particles.pages.tables[::2]:
+        surfaces = []
+        for place in zip(*np.nonzero(table != NO_TILE), strict=True):
+            inside = np.argwhere(particles.pool.arrays.log_odds[table[place]] > 0)
+            surfaces += [tuple(cell) for cell in inside + np.array(place) * n]
+        assert surfaces
+        sensor = config.sensor
+        rows, columns = (np.arange(tiles * n) for tiles in table.shape)
+        field = field_of(
+            surfaces, rows, columns, resolution_m, sensor.hit_sigma_meters, sensor.outlier_probability
+        )
+        for row, column in zip(*np.nonzero(table != NO_TILE), strict=True):
+            np.testing.assert_array_equal(
+                particles.pool.arrays.field[table[row, column]],
+                field[row * n : (row + 1) * n, column * n : (column + 1) * n],
+            )
+        assert field.any()
+
+
 class TestWholeConfigurations:
     """Whatever the bounds allow must not touch memory that is not a map's."""
 
@@ -382,11 +419,19 @@ class TestWholeConfigurations:
         [
             {"matching": MatchingConfig(window_meters=0.0, window_radians=0.0)},
             {"sensor": SensorConfig(hit_sigma_meters=0.8)},
+            {"grid": GridConfig(resolution_meters=0.2, coarse_factor=2), "sensor": BLURRED},
             {"proposal": ProposalConfig(extent_meters=1.0, extent_radians=1.0, samples_per_axis=3)},
             {"motion": MotionConfig(update_distance_meters=0.0, update_angle_radians=0.0)},
             {"particles": 1},
         ],
-        ids=["no window", "blurred walls", "wide proposal", "every scan", "one particle"],
+        ids=[
+            "no window",
+            "blurred walls",
+            "walls blurred far",
+            "wide proposal",
+            "every scan",
+            "one particle",
+        ],
     )
     def test_it_maps_and_repeats_itself(self, workers, changes):
         config = replace(replace(CONFIG, particles=3), **changes)

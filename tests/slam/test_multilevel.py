@@ -187,5 +187,5 @@ def test_in_a_room_most_of_the_window_is_never_looked_at():
     predicted = np.array((true[0] - 9.0, true[1] + 6.0, 0.08))
     found = assert_exact(field, points, predicted, window, Objective(0.02, 0.001, 1.0), block)
     assert (found.row, found.column, found.step) == (-6, 9, -4)
-    quarters = 21 * 4 * 4 * 4
-    assert 1 <= found.quarters_scored < 0.05 * quarters
+    # Of 21 x 4 x 4 voxels of four quarters each; not even those of an opened voxel are all scored.
+    assert 1 <= found.quarters_scored < 20

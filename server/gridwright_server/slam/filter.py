@@ -107,6 +107,7 @@ class ParticleFilter:
     def _places(self, poses: NDArray[np.float64], beams: Beams, noise: MotionNoise) -> Places:
         """The parts of the maps that an update can touch; made room for."""
         slack_cells = search_slack_cells(self._window, self.grid.block_cells)
+        slack_cells += len(self.grid.stamp)  # a surface that goes changes the field that far around it
         slack_m = slack_cells * self.grid.resolution_m + DRAW_LIMIT * noise.translation_m
         places = places_around(poses, beams.reach_m + slack_m, self._tile_m)
         self.pages.check(places.box)
