@@ -34,6 +34,7 @@ class MotionConfig:
 
     update_distance_meters: float = bounded(0.2, 0.0, 10.0)
     update_angle_radians: float = bounded(0.2, 0.0, math.pi)
+    update_score: float = bounded(0.6, 0.0, 1.0)
     translation_sigma_per_meter: float = bounded(0.1, 0.0, 10.0)
     translation_sigma_per_radian: float = bounded(0.05, 0.0, 10.0)
     rotation_sigma_per_meter: float = bounded(0.05, 0.0, 10.0)
@@ -49,8 +50,8 @@ class SensorConfig:
     usable_range_meters: float = bounded(60.0, 0.1, 1000.0)
     hit_sigma_meters: float = bounded(0.06, 0.001, 10.0)
     outlier_probability: float = bounded(0.05, 0.0001, 0.9999)
-    likelihood_gain: float = bounded(2.0, 0.0001, 100.0)
-    weight_gain: float = bounded(1.0, 0.0, 100.0)
+    likelihood_gain: float = bounded(4.0, 0.0001, 100.0)
+    weight_gain: float = bounded(0.2, 0.0, 100.0)
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ class MatchingConfig:
     window_radians: float = bounded(0.25, 0.0, math.pi)
     angle_step_radians: float = bounded(0.00872665, 0.0001, 1.0)
     minimum_score: float = bounded(0.3, 0.0, 1.0)
+    widening: int = bounded(3, 1, 10)
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from gridwright_server.slam.particles import (
     Matching,
     Proposed,
     View,
+    fit_at,
     integrate_scan,
     propose,
     search_slack_cells,
@@ -50,7 +51,8 @@ class ParticleFilter:
         self._shares = _shares(config.particles, worker_count)
         model = likelihood_model(config.sensor, config.grid.resolution_meters)
         self.grid = _grid_of(config, model)
-        self._window = _window_of(config)
+        self._window = _window_of(config, 1)
+        self._wide_window = _window_of(config, config.matching.widening)
         self._likelihood_scale = model.log_likelihood_per_step * config.sensor.likelihood_gain
         self.pool = TilePool(self.grid.tile_cells, self.grid.block_cells)
         self.pages = PageTables(config.particles, self.pool)
@@ -100,13 +102,20 @@ class ParticleFilter:
         if self.effective_sample_size < self._config.resampling.threshold_ratio * len(self.poses):
             self._resample(comb_offset)
 
+    def fit_of(self, moved: Pose, beams: Beams) -> float:
+        """How well a scan fits the best map where odometry puts it: 1 = all end points on surfaces."""
+        best = self.best
+        predicted = compose_all(self.poses, moved)
+        places = self._places(predicted, beams, noise_of(self._config.motion, moved))
+        return fit_at(self._maps(places), best, predicted[best], beams.points, self.grid)
+
     def best_path(self) -> NDArray[np.float64]:
         """The best particle's poses at all updates, shape (updates, 3)."""
         return self.ancestry.path(int(self._parents[self.best]))
 
     def _places(self, poses: NDArray[np.float64], beams: Beams, noise: MotionNoise) -> Places:
         """The parts of the maps that an update can touch; made room for."""
-        slack_cells = search_slack_cells(self._window, self.grid.block_cells)
+        slack_cells = search_slack_cells(self._wide_window, self.grid.block_cells)
         slack_cells += len(self.grid.stamp)  # a surface that goes changes the field that far around it
         slack_m = slack_cells * self.grid.resolution_m + DRAW_LIMIT * noise.translation_m
         places = places_around(poses, beams.reach_m + slack_m, self._tile_m)
@@ -158,6 +167,7 @@ class ParticleFilter:
         extent_cells = config.proposal.extent_meters / resolution_m
         return Matching(
             self._window,
+            self._wide_window,
             Objective(
                 self._likelihood_scale, (resolution_m / noise.translation_m) ** 2, 1.0 / noise.rotation_rad**2
             ),
@@ -183,9 +193,10 @@ class ParticleFilter:
         wanted = np.zeros(maps.tables.shape, np.bool_)
         self._on_all(lambda begin, end: want(maps, poses, view, self.grid, begin, end, wanted))
         # One after the other: which tile a particle gets must not depend on which worker came first.
-        for particle in range(len(poses)):
-            self.pool.make_writable(self.pages.part(places, particle), wanted[particle])
-        maps = self._maps(places)
+        for table, mask in zip(maps.tables, wanted, strict=True):
+            self.pool.make_writable(table, mask)
+        self.pages.replace(places, maps.tables)
+        maps = maps._replace(arrays=self.pool.arrays)  # making room may have moved them
         self._on_all(lambda begin, end: integrate_scan(maps, poses, view, self.grid, begin, end))
 
     def _maps(self, places: Places) -> Maps:
@@ -242,13 +253,13 @@ def _quarter(coarse_factor: int) -> int:
     return coarse_factor // 2 if coarse_factor % 2 == 0 else coarse_factor
 
 
-def _window_of(config: MapperConfig) -> Window:
+def _window_of(config: MapperConfig, widening: int) -> Window:
     matching, factor = config.matching, config.grid.coarse_factor
     voxel_m = config.grid.resolution_meters * factor
     # Rounded up to whole voxels and steps; the small number forgives binary fractions.
     return Window(
-        max(math.ceil(matching.window_meters / voxel_m - 1e-9), 1),
-        math.ceil(matching.window_radians / matching.angle_step_radians - 1e-9),
+        widening * max(math.ceil(matching.window_meters / voxel_m - 1e-9), 1),
+        widening * math.ceil(matching.window_radians / matching.angle_step_radians - 1e-9),
         matching.angle_step_radians,
         factor,
         _quarter(factor),

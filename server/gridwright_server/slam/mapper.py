@@ -1,11 +1,12 @@
 """The mapper: sensor items in their order of arrival go in, poses and the map come out."""
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from gridwright_server.config import MapperConfig
+from gridwright_server.config import MapperConfig, ResamplingConfig
 from gridwright_server.errors import ResourceExhaustedError
 from gridwright_server.slam import se2
 from gridwright_server.slam.beams import Beams, beams_of
@@ -33,8 +34,10 @@ class Mapper:
         self._odometry = OdometryBuffer()
         self._scans = ScanRecord()
         self._newest_ns: int | None = None
-        self._last_odom: Pose | None = None
-        self._last_update_ns = 0
+        self._odom_at_update: Pose = np.zeros(3)
+        self._odom_at_last_update_of: dict[bytes, Pose] = {}
+        """By the laser's mounting: each laser has a motion filter of its own, for each sees other things."""
+        self._update_ns = 0
         self._estimate: PoseEstimate | None = None
 
     def add_odometry(self, stamp_ns: int, odom_from_base: Pose) -> Verdict:
@@ -51,13 +54,13 @@ class Mapper:
         if not self._odometry:
             return ScanResult(Verdict.REJECTED_NO_ODOMETRY)
         odom_from_base = self._odometry.at(scan.stamp_ns)
-        due = self._is_update_due(odom_from_base)
-        if due:
-            try:
-                self._update(odom_from_base, beams_of(scan, self._config.sensor.usable_range_meters))
-            except ResourceExhaustedError:
-                return ScanResult(Verdict.REJECTED_OUTSIDE_MAP)
-            self._last_update_ns = scan.stamp_ns
+        beams = beams_of(scan, self._config.sensor.usable_range_meters)
+        try:
+            due = self._is_update_due(scan, odom_from_base, beams)
+            if due:
+                self._update(scan, odom_from_base, beams)
+        except ResourceExhaustedError:
+            return ScanResult(Verdict.REJECTED_OUTSIDE_MAP)
         self._scans.append(scan.stamp_ns, odom_from_base, self._filter.updates - 1, due)
         self._estimate = self._estimate_at(scan.stamp_ns, odom_from_base)
         verdict = Verdict.PROCESSED if due else Verdict.SKIPPED_BELOW_MOTION_THRESHOLD
@@ -81,7 +84,7 @@ class Mapper:
             best.pages,
             best.best,
             best.grid.resolution_m,
-            self._last_update_ns,
+            self._update_ns,
             best.updates,
             best.generation,
         )
@@ -92,23 +95,33 @@ class Mapper:
         self._newest_ns = stamp_ns if self._newest_ns is None else max(self._newest_ns, stamp_ns)
         return False
 
-    def _is_update_due(self, odom_from_base: Pose) -> bool:
-        if self._last_odom is None:
+    def _is_update_due(self, scan: Scan, odom_from_base: Pose, beams: Beams) -> bool:
+        """Has the robot moved since this laser's last update, by odometry or (wheels slip) by the scan?"""
+        odom_at_last = self._odom_at_last_update_of.get(scan.base_from_laser.tobytes())
+        if odom_at_last is None:
             return True
-        return is_update_due(self._config.motion, se2.between(self._last_odom, odom_from_base))
+        if is_update_due(self._config.motion, se2.between(odom_at_last, odom_from_base)):
+            return True
+        return self._filter.fit_of(self._moved_to(odom_from_base), beams) < self._config.motion.update_score
 
-    def _update(self, odom_from_base: Pose, beams: Beams) -> None:
-        if self._last_odom is None:
+    def _update(self, scan: Scan, odom_from_base: Pose, beams: Beams) -> None:
+        if self._filter.updates == 0:
             # The frame map starts as odom does: until a match corrects it, map -> odom is the identity.
             self._filter.start(odom_from_base, beams)
         else:
-            self._filter.update(se2.between(self._last_odom, odom_from_base), beams)
-        self._last_odom = odom_from_base
+            self._filter.update(self._moved_to(odom_from_base), beams)
+        self._odom_at_update = odom_from_base
+        self._odom_at_last_update_of[scan.base_from_laser.tobytes()] = odom_from_base
+        self._update_ns = scan.stamp_ns
+
+    def _moved_to(self, odom_from_base: Pose) -> Pose:
+        """Odometry since the last update."""
+        return se2.between(self._odom_at_update, odom_from_base)
 
     def _estimate_at(self, stamp_ns: int, odom_from_base: Pose) -> PoseEstimate:
         """The best particle's pose, carried on by the odometry since the last update."""
         particles = self._filter
-        moved = se2.between(odom_from_base if self._last_odom is None else self._last_odom, odom_from_base)
+        moved = self._moved_to(odom_from_base)
         map_from_base = se2.compose(particles.poses[particles.best], moved)
         covariance = particles.covariance
         if np.any(moved):
@@ -125,14 +138,20 @@ class Mapper:
 
 def warm_up() -> None:
     """Compiles (or loads from the cache) every kernel, by mapping a made-up room."""
-    bearings_rad = np.linspace(-1.5, 1.5, 31)
-    scan = Scan(0, bearings_rad, np.full(31, 2.0), 0.1, 10.0, np.zeros(3))
-    mapper = Mapper(MapperConfig(particles=2), 0, _Inline(), 1)
+    scan = Scan(0, np.linspace(-1.5, 1.5, 31), np.full(31, 2.0), 0.1, 10.0, np.zeros(3))
+    mapper = Mapper(
+        MapperConfig(particles=2, resampling=ResamplingConfig(threshold_ratio=1.0)), 0, _Inline(), 1
+    )
     mapper.add_odometry(0, np.zeros(3))
-    for step in range(4):
-        mapper.add_odometry(step, np.array((0.5 * step, 0.0, 0.1)))
-        mapper.add_scan(scan)
+    for k in range(1, 5):
+        mapper.add_odometry(2 * k, np.array((0.15 * k, 0.0, 0.1)))
+        mapper.add_scan(replace(scan, stamp_ns=2 * k - 1))
     mapper.trajectory()
+    snapshot = mapper.map_snapshot()
+    assert snapshot is not None
+    snapshot.close()
+    mapper.add_odometry(10, np.array((1.0, 0.0, 0.1)))
+    mapper.add_scan(replace(scan, stamp_ns=10))
 
 
 class _Inline:

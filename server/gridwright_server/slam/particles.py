@@ -13,6 +13,7 @@ from gridwright_server.slam.matching.multilevel import CoarseLevel, Objective, W
 from gridwright_server.slam.matching.refine import climb, interpolated_sum
 from gridwright_server.slam.proposal import Lattice, covariance_of, draw, fit
 from gridwright_server.slam.se2 import wrap
+from gridwright_server.slam.types import Pose
 
 FULL_SCORE = 255.0
 """The field on a surface."""
@@ -46,6 +47,8 @@ class Matching(NamedTuple):
     """How to match a scan and how to draw from what is found."""
 
     window: Window
+    wide_window: Window
+    """Searched where the window holds no match, or one at its border."""
     objective: Objective
     lattice: Lattice
     minimum_score: float
@@ -81,6 +84,16 @@ class Maps(NamedTuple):
     """shape (particles, 2): lattice row and column of the first cell of each page table"""
 
 
+class Patch(NamedTuple):
+    """The part of a particle's map around its pose, laid out densely; storage used again and again."""
+
+    field: NDArray[np.uint8]
+    blocks: NDArray[np.uint8]
+    scratch: NDArray[np.uint8]
+    reached: NDArray[np.bool_]
+    level: CoarseLevel
+
+
 @kernel
 def propose(
     maps: Maps,
@@ -97,39 +110,24 @@ def propose(
 
     predicted: shape (particles, 3), map_from_base; draws: shape (particles, 3), standard normal.
     """
-    resolution, window = grid.resolution_m, matching.window
-    size, n = maps.tables.shape[1], grid.tile_cells
-    blocks_along = size * n // grid.block_cells
-    field = np.empty((size * n, size * n), np.uint8)
-    blocks = np.empty((blocks_along, blocks_along), np.uint8)
-    scratch = np.empty_like(blocks)
-    level = CoarseLevel(grid.block_cells, np.empty_like(blocks), np.empty_like(blocks))
-    reached = np.empty((size, size), np.bool_)
-    slack_m = search_slack_cells(window, grid.block_cells) * resolution
-    slack_rad = (window.half_steps + 2) * window.angle_step_rad
+    resolution = grid.resolution_m
+    patch = new_patch(maps.tables.shape[1], grid)
     for p in range(begin, end):
-        table = maps.tables[p]
         # From here on poses are (column, row, theta), in cells counted from the patch's corner.
-        corner_m = np.array((maps.first_cells[p, 1] * resolution, maps.first_cells[p, 0] * resolution))
+        corner_m = _corner_m(maps, p, resolution)
         expected = predicted[p].copy()
-        expected[:2] -= corner_m
-        tiles_reached(view.points, expected, slack_m, slack_rad, n * resolution, reached)
-        expected[:2] /= resolution
-        gather(maps.arrays.field, table, reached, field)
-        gather(maps.arrays.blocks, table, reached, blocks)
-        reachable_maximum(blocks, grid.block_cells, window.coarse, scratch, level.voxel)
-        reachable_maximum(blocks, grid.block_cells, window.quarter, scratch, level.quarter)
+        expected[:2] = (expected[:2] - corner_m) / resolution
+        match, score, at_border, quarters = _match(
+            maps, p, expected, view, grid, matching, matching.window, patch
+        )
+        if at_border or score < matching.minimum_score:  # odometry may be wrong, not only noisy: look further
+            match, score, _, more = _match(
+                maps, p, expected, view, grid, matching, matching.wide_window, patch
+            )
+            quarters += more
+        out.scores[p], out.quarters[p] = score, quarters
 
-        found = search(field, level, view.points, expected, resolution, window, matching.objective)
-        best = expected.copy()
-        best[0] += found.column
-        best[1] += found.row
-        best[2] += found.step * window.angle_step_rad
-        match = climb(field, view.points, best, expected, resolution, window, matching.objective)
-        total = interpolated_sum(field, view.points, match[0], match[1], match[2], resolution)
-        out.scores[p] = total / (FULL_SCORE * max(len(view.points), 1))
-        out.quarters[p] = found.quarters_scored
-
+        field = patch.field
         if out.scores[p] < matching.minimum_score:  # the match failed: trust the motion model (lines 6-8)
             mean, factor = expected, _motion_factor(matching, resolution)
         else:  # lines 9-33
@@ -147,6 +145,81 @@ def propose(
         _to_map(mean, corner_m, resolution, out.means[p])
         factor[:2] *= resolution
         out.covariances[p] = covariance_of(factor)
+
+
+@kernel
+def _match(maps, p, expected, view, grid, matching, window, patch):
+    """The best pose of a window around the expected one, refined.
+
+    Returns (column, row, theta), its score, whether it lies at the window's border, and the number of
+    quarters scored.
+    """
+    resolution = grid.resolution_m
+    _lay_out(maps, p, expected, view, grid, window, patch)
+    found = search(patch.field, patch.level, view.points, expected, resolution, window, matching.objective)
+    best = expected.copy()
+    best[0] += found.column
+    best[1] += found.row
+    best[2] += found.step * window.angle_step_rad
+    match = climb(patch.field, view.points, best, expected, resolution, window, matching.objective)
+    score = mean_field(patch.field, view.points, match, resolution)
+    return match, score, _is_at_border(found, window), found.quarters_scored
+
+
+@kernel
+def _is_at_border(found, window):
+    first, last = -window.half_voxels * window.coarse, window.half_voxels * window.coarse - 1
+    return found.row in (first, last) or found.column in (first, last) or abs(found.step) == window.half_steps
+
+
+@kernel
+def mean_field(field, points, pose, resolution_m):
+    """How well a scan fits at a pose, (column, row, theta) in cells of the patch: 1 = all on surfaces."""
+    total = interpolated_sum(field, points, pose[0], pose[1], pose[2], resolution_m)
+    return total / (FULL_SCORE * max(len(points), 1))
+
+
+@kernel
+def new_patch(size, grid):
+    """Storage for the part of a map that `size` x `size` tiles cover."""
+    blocks_along = size * grid.tile_cells // grid.block_cells
+    blocks = np.empty((blocks_along, blocks_along), np.uint8)
+    return Patch(
+        np.empty((size * grid.tile_cells, size * grid.tile_cells), np.uint8),
+        blocks,
+        np.empty_like(blocks),
+        np.empty((size, size), np.bool_),
+        CoarseLevel(grid.block_cells, np.empty_like(blocks), np.empty_like(blocks)),
+    )
+
+
+@kernel
+def _lay_out(maps, p, expected, view, grid, window, patch):
+    """Fills a patch with what a search of the window can reach of the particle's map."""
+    slack_cells = search_slack_cells(window, grid.block_cells)
+    slack_rad = (window.half_steps + 2) * window.angle_step_rad
+    tiles_reached(view.points, expected, slack_cells, slack_rad, grid, patch.reached)
+    gather(maps.arrays.field, maps.tables[p], patch.reached, patch.field)
+    gather(maps.arrays.blocks, maps.tables[p], patch.reached, patch.blocks)
+    reachable_maximum(patch.blocks, grid.block_cells, window.coarse, patch.scratch, patch.level.voxel)
+    reachable_maximum(patch.blocks, grid.block_cells, window.quarter, patch.scratch, patch.level.quarter)
+
+
+@kernel
+def fit_at(maps: Maps, p: int, pose: Pose, points: NDArray[np.float64], grid: Grid) -> float:
+    """How well a scan's points fit the map of particle p from a pose, map_from_base: 1 = all on surfaces."""
+    patch = new_patch(maps.tables.shape[1], grid)
+    local = pose.copy()
+    local[:2] = (local[:2] - _corner_m(maps, p, grid.resolution_m)) / grid.resolution_m
+    tiles_reached(points, local, 2, 0.0, grid, patch.reached)
+    gather(maps.arrays.field, maps.tables[p], patch.reached, patch.field)
+    return mean_field(patch.field, points, local, grid.resolution_m)
+
+
+@kernel
+def _corner_m(maps, p, resolution_m):
+    """x and y of the first corner of a particle's part of the map."""
+    return np.array((maps.first_cells[p, 1] * resolution_m, maps.first_cells[p, 0] * resolution_m))
 
 
 @kernel

@@ -98,15 +98,19 @@ class PageTables:
             tables[:, row : row + rows, column : column + columns] = self.tables
         self.tables, self.window = tables, grown
 
-    def part(self, places: Places, particle: int) -> NDArray[np.int32]:
-        """The page table of one particle's part; a view, shape (size, size)."""
+    def parts(self, places: Places) -> NDArray[np.int32]:
+        """The page tables of all particles' parts; a copy, shape (particles, size, size)."""
+        return np.stack([self._part(places, particle) for particle in range(len(self.tables))])
+
+    def replace(self, places: Places, parts: NDArray[np.int32]) -> None:
+        """Puts parts as of `parts` back."""
+        for particle in range(len(self.tables)):
+            self._part(places, particle)[:] = parts[particle]
+
+    def _part(self, places: Places, particle: int) -> NDArray[np.int32]:
         row = places.first_tiles[particle, 0] - self.window.row_begin
         column = places.first_tiles[particle, 1] - self.window.column_begin
         return self.tables[particle, row : row + places.size, column : column + places.size]
-
-    def parts(self, places: Places) -> NDArray[np.int32]:
-        """The page tables of all particles' parts; a copy, shape (particles, size, size)."""
-        return np.stack([self.part(places, particle) for particle in range(len(self.tables))])
 
     def resample(self, ancestors: NDArray[np.int64]) -> None:
         """Particle i becomes a copy of ancestors[i]: page tables are copied, tiles are shared."""

@@ -11,22 +11,23 @@ from gridwright_server.slam.grid.tiles import NO_TILE
 
 
 @kernel
-def tiles_reached(points, pose, slack_m, slack_rad, tile_m, reached):
-    """Marks the tiles that end points can fall in, wherever in the window the pose is.
+def tiles_reached(points, pose, slack_cells, slack_rad, grid, reached):
+    """Marks the tiles that end points can fall in, wherever within the slack the pose is.
 
-    points: shape (returns, 2), in base_link; pose: map_from_base with x and y counted from the
-    patch's corner; slack: how far the pose may be from there. reached: shape (tile rows, tile columns).
+    points: shape (returns, 2), in base_link, m; pose: (column, row, theta), in cells of the patch;
+    reached: shape (tile rows, tile columns).
     """
     reached[:] = False
-    c, s = math.cos(pose[2]), math.sin(pose[2])
+    c, s = math.cos(pose[2]) / grid.resolution_m, math.sin(pose[2]) / grid.resolution_m
+    per_tile = 1.0 / grid.tile_cells
     for k in range(len(points)):
         px, py = points[k, 0], points[k, 1]
-        x, y = pose[0] + c * px - s * py, pose[1] + s * px + c * py
-        slack = slack_m + slack_rad * math.hypot(px, py)
-        bottom = max(math.floor((y - slack) / tile_m), 0)
-        top = min(math.floor((y + slack) / tile_m) + 1, reached.shape[0])
-        left = max(math.floor((x - slack) / tile_m), 0)
-        right = min(math.floor((x + slack) / tile_m) + 1, reached.shape[1])
+        column, row = pose[0] + c * px - s * py, pose[1] + s * px + c * py
+        slack = slack_cells + slack_rad * math.hypot(px, py) / grid.resolution_m
+        bottom = max(math.floor((row - slack) * per_tile), 0)
+        top = min(math.floor((row + slack) * per_tile) + 1, reached.shape[0])
+        left = max(math.floor((column - slack) * per_tile), 0)
+        right = min(math.floor((column + slack) * per_tile) + 1, reached.shape[1])
         for i in range(bottom, top):
             for j in range(left, right):
                 reached[i, j] = True
