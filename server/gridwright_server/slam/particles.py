@@ -137,6 +137,9 @@ def propose(
             mean, factor = proposal.mean, proposal.factor
         drawn = draw(mean, factor, draws[p])
         if out.scores[p] < matching.minimum_score:
+            # The draw may lead beyond what was laid out for the search.
+            tiles_reached(view.points, drawn, 2, 0.0, grid, patch.reached)
+            gather(maps.arrays.field, maps.tables[p], patch.reached, field)
             total = interpolated_sum(field, view.points, drawn[0], drawn[1], drawn[2], resolution)
             out.log_weights[p] = matching.objective.likelihood_scale * total
         else:
