@@ -53,12 +53,14 @@ class Both:
         reach_m = ranges.max(initial=0.0) + (2 * radius + 2) * RESOLUTION_M
         places = places_around(pose[np.newaxis], reach_m, TILE_CELLS * RESOLUTION_M)
         self.pages.cover(places.box)
-        table, first_cell = self.pages.part(places, 0), places.first_tiles[0] * TILE_CELLS
+        parts, first_cell = self.pages.parts(places), places.first_tiles[0] * TILE_CELLS
+        table = parts[0]
         runs, hits = cells_seen(outline, points, pose, RESOLUTION_M)
         wanted = np.zeros(table.shape, np.bool_)
         tiles_wanted(runs, hits, radius, TILE_CELLS, first_cell, wanted)
         self.pool.make_writable(table, wanted)
-        integrate(self.pool.arrays, table.copy(), first_cell, runs, hits, self.grid)
+        self.pages.replace(places, parts)
+        integrate(self.pool.arrays, table, first_cell, runs, hits, self.grid)
         self.naive.integrate(*cells_of_scan(outline, points, pose, RESOLUTION_M))
 
     def assert_same(self):

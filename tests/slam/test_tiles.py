@@ -40,11 +40,13 @@ class SharedTiles(RuleBasedStateMachine):
         size = max(box.shape)
         self.pages.cover(Box(box.row_begin, box.column_begin, box.row_begin + size, box.column_begin + size))
         corner = np.array([[box.row_begin, box.column_begin]] * PARTICLES)
-        table = self.pages.part(Places(corner, size), particle)
+        parts = self.pages.parts(Places(corner, size))
+        table = parts[particle]
         wanted = np.zeros((size, size), np.bool_)
         for row, column in at:
             wanted[row - box.row_begin, column - box.column_begin] = True
         self.pool.make_writable(table, wanted)
+        self.pages.replace(Places(corner, size), parts)
         self.given_back.clear()
         rng = np.random.default_rng(seed)
         for row, column in sorted(at):
