@@ -39,8 +39,8 @@ class MotionConfig:
     translation_sigma_per_radian: float = bounded(0.05, 0.0, 10.0)
     rotation_sigma_per_meter: float = bounded(0.05, 0.0, 10.0)
     rotation_sigma_per_radian: float = bounded(0.1, 0.0, 10.0)
-    translation_sigma_floor_meters: float = bounded(0.1, 0.0001, 10.0)
-    rotation_sigma_floor_radians: float = bounded(0.05, 0.0001, math.pi)
+    translation_sigma_floor_meters: float = bounded(0.03, 0.0001, 10.0)
+    rotation_sigma_floor_radians: float = bounded(0.03, 0.0001, math.pi)
 
 
 @dataclass(frozen=True)
@@ -58,9 +58,9 @@ class SensorConfig:
 class MatchingConfig:
     """The exhaustive two-level search (4.2.2)."""
 
-    window_meters: float = bounded(0.4, 0.0, 10.0)
-    window_radians: float = bounded(0.25, 0.0, math.pi)
-    angle_step_radians: float = bounded(0.00872665, 0.0001, 1.0)
+    window_meters: float = bounded(0.4, 0.01, 10.0)
+    window_radians: float = bounded(0.25, 0.001, math.pi)
+    angle_step_radians: float = bounded(0.0087, 0.001, 1.0)
     minimum_score: float = bounded(0.3, 0.0, 1.0)
     widening: int = bounded(3, 1, 10)
 

@@ -28,13 +28,14 @@ with ThreadPoolExecutor(2) as workers:
     for k in range(1, 30):
         session.add_odometry(100 * k, np.array((0.11 * k, 0.3 * k, 0.05 * k)))
         ranges = rng.uniform(0.5, 9.0, 181)
-        session.add_scan(Scan(100 * k - 30, np.linspace(-1.57, 1.57, 181), ranges, 0.1, 8.0, np.array((0.1, 0.0, 3.1))))
+        bearings, mounting = np.linspace(-1.57, 1.57, 181), np.array((0.1, 0.0, 3.1))
+        session.add_scan(Scan(100 * k - 30, bearings, ranges, 0.1, 8.0, mounting))
     session.trajectory()
     snapshot = session.map_snapshot()
     snapshot.occupancy(0)
     snapshot.close()
     session.add_odometry(3000, np.zeros(3))
-    session.add_scan(Scan(3000, np.linspace(-1.57, 1.57, 181), ranges, 0.1, 8.0, np.zeros(3)))
+    session.add_scan(Scan(3000, bearings, ranges, 0.1, 8.0, np.zeros(3)))
 after = compiled()
 late = {name: after[name] for name in after if after[name] != before[name]}
 assert not late, late

@@ -258,7 +258,7 @@ def _window_of(config: MapperConfig, widening: int) -> Window:
     voxel_m = config.grid.resolution_meters * factor
     # Rounded up to whole voxels and steps; the small number forgives binary fractions.
     return Window(
-        widening * max(math.ceil(matching.window_meters / voxel_m - 1e-9), 1),
+        widening * math.ceil(matching.window_meters / voxel_m - 1e-9),
         widening * math.ceil(matching.window_radians / matching.angle_step_radians - 1e-9),
         matching.angle_step_radians,
         factor,

@@ -137,7 +137,7 @@ def search(field, level, points, predicted, resolution_m, window, objective):
 
 @kernel
 def _coarse_sums(maxima, block_cells, rows, columns, row0, column0, side, sums):
-    """sums[i, j]: coarse score of the square whose first pose is moved by (row0 + i side, column0 + j side)."""
+    """sums[i, j]: coarse score of the square whose first pose is (row0 + i side, column0 + j side) away."""
     sums[:] = 0
     stride = side // block_cells
     # Half a cell off every border between blocks, rounding cannot cross one; and it beats a division.
