@@ -419,7 +419,7 @@ class TestWholeConfigurations:
     @pytest.mark.parametrize(
         "changes",
         [
-            {"matching": MatchingConfig(window_meters=0.0, window_radians=0.0)},
+            {"matching": MatchingConfig(window_meters=0.01, window_radians=0.001)},
             {"sensor": SensorConfig(hit_sigma_meters=0.8)},
             {"grid": GridConfig(resolution_meters=0.2, coarse_factor=2), "sensor": BLURRED},
             {"proposal": ProposalConfig(extent_meters=1.0, extent_radians=1.0, samples_per_axis=3)},
@@ -427,7 +427,7 @@ class TestWholeConfigurations:
             {"particles": 1},
         ],
         ids=[
-            "no window",
+            "hardly a window",
             "blurred walls",
             "walls blurred far",
             "wide proposal",
