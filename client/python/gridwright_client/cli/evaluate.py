@@ -83,22 +83,23 @@ def _or_none(value: float) -> float | None:
 def _table(result: Evaluation) -> Table:
     table = Table()
     table.add_column("error")
-    for heading in ("mean", "std. dev.", "mean of squares", "std. dev. of squares", "largest"):
+    for heading in ("mean", "std. dev.", "largest"):
         table.add_column(heading, justify="right")
-    table.add_row("translation", *_cells(result.translation_m, "m"))
-    table.add_row("rotation", *_cells(result.rotation_deg, "deg"))
+    for name, statistics, unit in (
+        ("translation", result.translation_m, "m"),
+        ("rotation", result.rotation_deg, "deg"),
+    ):
+        table.add_row(name, *(f"{value:.4f} {unit}" for value in _plain(statistics)))
+        table.add_row(f"{name}, squared", *(f"{value:.4f} {unit}²" for value in _squared(statistics)))
     return table
 
 
-def _cells(statistics: ErrorStatistics, unit: str) -> list[str]:
-    squared = f"{unit}²"
-    return [
-        f"{statistics.mean:.4f} {unit}",
-        f"{statistics.deviation:.4f} {unit}",
-        f"{statistics.squared_mean:.4f} {squared}",
-        f"{statistics.squared_deviation:.4f} {squared}",
-        f"{statistics.largest:.4f} {unit}",
-    ]
+def _plain(statistics: ErrorStatistics) -> tuple[float, float, float]:
+    return statistics.mean, statistics.deviation, statistics.largest
+
+
+def _squared(statistics: ErrorStatistics) -> tuple[float, float, float]:
+    return statistics.squared_mean, statistics.squared_deviation, statistics.largest**2
 
 
 def _counts(result: Evaluation) -> str:
