@@ -51,6 +51,7 @@ class ParticleFilter:
         self._shares = _shares(config.particles, worker_count)
         model = likelihood_model(config.sensor, config.grid.resolution_meters)
         self.grid = _grid_of(config, model)
+        self._lattice = _lattice_of(config)
         self._window = _window_of(config, 1)
         self._wide_window = _window_of(config, config.matching.widening)
         self._likelihood_scale = model.log_likelihood_per_step * config.sensor.likelihood_gain
@@ -115,7 +116,7 @@ class ParticleFilter:
 
     def _places(self, poses: NDArray[np.float64], beams: Beams, noise: MotionNoise) -> Places:
         """The parts of the maps that an update can touch; made room for."""
-        slack_cells = search_slack_cells(self._wide_window, self.grid.block_cells)
+        slack_cells = search_slack_cells(self._wide_window, self.grid.block_cells, self._lattice)
         slack_cells += len(self.grid.stamp)  # a surface that goes changes the field that far around it
         slack_m = slack_cells * self.grid.resolution_m + DRAW_LIMIT * noise.translation_m
         places = places_around(poses, beams.reach_m + slack_m, self._tile_m)
@@ -164,17 +165,13 @@ class ParticleFilter:
 
     def _matching(self, noise: MotionNoise) -> Matching:
         config, resolution_m = self._config, self.grid.resolution_m
-        extent_cells = config.proposal.extent_meters / resolution_m
         return Matching(
             self._window,
             self._wide_window,
             Objective(
                 self._likelihood_scale, (resolution_m / noise.translation_m) ** 2, 1.0 / noise.rotation_rad**2
             ),
-            Lattice(
-                np.array((extent_cells, extent_cells, config.proposal.extent_radians)),
-                config.proposal.samples_per_axis,
-            ),
+            self._lattice,
             config.matching.minimum_score,
             noise.translation_m,
             noise.rotation_rad,
@@ -264,6 +261,12 @@ def _window_of(config: MapperConfig, widening: int) -> Window:
         factor,
         _quarter(factor),
     )
+
+
+def _lattice_of(config: MapperConfig) -> Lattice:
+    extent_cells = config.proposal.extent_meters / config.grid.resolution_meters
+    extent = np.array((extent_cells, extent_cells, config.proposal.extent_radians))
+    return Lattice(extent, config.proposal.samples_per_axis)
 
 
 def _mixture_covariance(

@@ -11,7 +11,7 @@ from gridwright_server.errors import ResourceExhaustedError
 from gridwright_server.slam import se2
 from gridwright_server.slam.beams import Beams, beams_of
 from gridwright_server.slam.filter import ParticleFilter
-from gridwright_server.slam.motion import is_update_due, noise_of
+from gridwright_server.slam.motion import drift_of, is_update_due
 from gridwright_server.slam.odometry import OdometryBuffer
 from gridwright_server.slam.scans import ScanRecord
 from gridwright_server.slam.snapshot import TileSnapshot
@@ -123,9 +123,7 @@ class Mapper:
         particles = self._filter
         moved = self._moved_to(odom_from_base)
         map_from_base = se2.compose(particles.poses[particles.best], moved)
-        covariance = particles.covariance
-        if np.any(moved):
-            covariance = covariance + noise_of(self._config.motion, moved).covariance()
+        covariance = particles.covariance + drift_of(self._config.motion, moved).covariance()
         return PoseEstimate(
             stamp_ns,
             map_from_base,

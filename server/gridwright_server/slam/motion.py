@@ -28,16 +28,19 @@ class MotionNoise:
 
 def noise_of(config: MotionConfig, moved: Pose) -> MotionNoise:
     """How far odometry may be off after it reports the motion `moved` (old base from new base)."""
+    drift = drift_of(config, moved)
+    return MotionNoise(
+        math.hypot(config.translation_sigma_floor_meters, drift.translation_m),
+        math.hypot(config.rotation_sigma_floor_radians, drift.rotation_rad),
+    )
+
+
+def drift_of(config: MotionConfig, moved: Pose) -> MotionNoise:
+    """The part of it that grows with the motion: none at rest."""
     distance_m, turn_rad = math.hypot(moved[0], moved[1]), abs(wrap(moved[2]))
     return MotionNoise(
-        math.hypot(
-            config.translation_sigma_floor_meters,
-            config.translation_sigma_per_meter * distance_m + config.translation_sigma_per_radian * turn_rad,
-        ),
-        math.hypot(
-            config.rotation_sigma_floor_radians,
-            config.rotation_sigma_per_meter * distance_m + config.rotation_sigma_per_radian * turn_rad,
-        ),
+        config.translation_sigma_per_meter * distance_m + config.translation_sigma_per_radian * turn_rad,
+        config.rotation_sigma_per_meter * distance_m + config.rotation_sigma_per_radian * turn_rad,
     )
 
 

@@ -1,5 +1,6 @@
 """What one update does to one particle: match, propose and draw; then integrate (Algorithm 1)."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -10,8 +11,8 @@ from gridwright_server.slam.grid.occupancy import cells_seen, integrate, tiles_w
 from gridwright_server.slam.grid.patch import gather, reachable_maximum, tiles_reached
 from gridwright_server.slam.grid.tiles import TileArrays
 from gridwright_server.slam.matching.multilevel import CoarseLevel, Objective, Window, search
-from gridwright_server.slam.matching.refine import climb, interpolated_sum
-from gridwright_server.slam.proposal import Lattice, covariance_of, draw, fit
+from gridwright_server.slam.matching.refine import CLIMB_LIMIT, climb, interpolated_sum
+from gridwright_server.slam.proposal import Lattice, Proposal, covariance_of, draw, fit
 from gridwright_server.slam.se2 import wrap
 from gridwright_server.slam.types import Pose
 
@@ -117,37 +118,50 @@ def propose(
         corner_m = _corner_m(maps, p, resolution)
         expected = predicted[p].copy()
         expected[:2] = (expected[:2] - corner_m) / resolution
-        match, score, at_border, quarters = _match(
-            maps, p, expected, view, grid, matching, matching.window, patch
-        )
-        if at_border or score < matching.minimum_score:  # odometry may be wrong, not only noisy: look further
-            match, score, _, more = _match(
-                maps, p, expected, view, grid, matching, matching.wide_window, patch
-            )
-            quarters += more
-        out.scores[p], out.quarters[p] = score, quarters
-
-        field = patch.field
-        if out.scores[p] < matching.minimum_score:  # the match failed: trust the motion model (lines 6-8)
-            mean, factor = expected, _motion_factor(matching, resolution)
+        match, score, quarters = _find(maps, p, expected, view, grid, matching, patch)
+        if score < matching.minimum_score:  # lines 6-8
+            proposal = _motion_proposal(maps, p, expected, draws[p], view, grid, matching, patch)
         else:  # lines 9-33
             proposal = fit(
-                field, view.points, match, expected, resolution, matching.objective, matching.lattice
+                patch.field, view.points, match, expected, resolution, matching.objective, matching.lattice
             )
-            mean, factor = proposal.mean, proposal.factor
-        drawn = draw(mean, factor, draws[p])
-        if out.scores[p] < matching.minimum_score:
-            # The draw may lead beyond what was laid out for the search.
-            tiles_reached(view.points, drawn, 2, 0.0, grid, patch.reached)
-            gather(maps.arrays.field, maps.tables[p], patch.reached, field)
-            total = interpolated_sum(field, view.points, drawn[0], drawn[1], drawn[2], resolution)
-            out.log_weights[p] = matching.objective.likelihood_scale * total
-        else:
-            out.log_weights[p] = proposal.log_eta
+        drawn = draw(proposal.mean, proposal.factor, draws[p])
         _to_map(drawn, corner_m, resolution, out.poses[p])
-        _to_map(mean, corner_m, resolution, out.means[p])
-        factor[:2] *= resolution
-        out.covariances[p] = covariance_of(factor)
+        _to_map(proposal.mean, corner_m, resolution, out.means[p])
+        proposal.factor[:2] *= resolution
+        out.covariances[p] = covariance_of(proposal.factor)
+        out.log_weights[p] = proposal.log_eta
+        out.scores[p], out.quarters[p] = score, quarters
+
+
+@kernel
+def _find(maps, p, expected, view, grid, matching, patch):
+    """The match and its score, and how many quarters were scored for it.
+
+    Where the window holds none, or one at its border, odometry may be wrong, not only noisy: the wide
+    window is searched too.
+    """
+    match, score, at_border, quarters = _match(
+        maps, p, expected, view, grid, matching, matching.window, patch
+    )
+    if at_border or score < matching.minimum_score:
+        match, score, _, more = _match(maps, p, expected, view, grid, matching, matching.wide_window, patch)
+        quarters += more
+    return match, score, quarters
+
+
+@kernel
+def _motion_proposal(maps, p, expected, normals, view, grid, matching, patch):
+    """The motion model, for want of a match; weighed at the pose that `normals` draw from it."""
+    factor = np.zeros((3, 3))
+    factor[0, 0] = factor[1, 1] = matching.translation_sigma_m / grid.resolution_m
+    factor[2, 2] = matching.rotation_sigma_rad
+    drawn = draw(expected, factor, normals)
+    # The draw may lead beyond what was laid out for the search.
+    tiles_reached(view.points, drawn, 2, 0.0, grid, patch.reached)
+    gather(maps.arrays.field, maps.tables[p], patch.reached, patch.field)
+    total = interpolated_sum(patch.field, view.points, drawn[0], drawn[1], drawn[2], grid.resolution_m)
+    return Proposal(expected, factor, matching.objective.likelihood_scale * total)
 
 
 @kernel
@@ -158,7 +172,7 @@ def _match(maps, p, expected, view, grid, matching, window, patch):
     quarters scored.
     """
     resolution = grid.resolution_m
-    _lay_out(maps, p, expected, view, grid, window, patch)
+    _lay_out(maps, p, expected, view, grid, matching.lattice, window, patch)
     found = search(patch.field, patch.level, view.points, expected, resolution, window, matching.objective)
     best = expected.copy()
     best[0] += found.column
@@ -197,10 +211,10 @@ def new_patch(size, grid):
 
 
 @kernel
-def _lay_out(maps, p, expected, view, grid, window, patch):
+def _lay_out(maps, p, expected, view, grid, lattice, window, patch):
     """Fills a patch with what a search of the window can reach of the particle's map."""
-    slack_cells = search_slack_cells(window, grid.block_cells)
-    slack_rad = (window.half_steps + 2) * window.angle_step_rad
+    slack_cells = search_slack_cells(window, grid.block_cells, lattice)
+    slack_rad = (window.half_steps + CLIMB_LIMIT) * window.angle_step_rad + lattice.extent[2]
     tiles_reached(view.points, expected, slack_cells, slack_rad, grid, patch.reached)
     gather(maps.arrays.field, maps.tables[p], patch.reached, patch.field)
     gather(maps.arrays.blocks, maps.tables[p], patch.reached, patch.blocks)
@@ -226,20 +240,14 @@ def _corner_m(maps, p, resolution_m):
 
 
 @kernel
-def search_slack_cells(window: Window, block_cells: int) -> int:
-    """How far from where it falls at the predicted pose the search may look up an end point.
+def search_slack_cells(window: Window, block_cells: int, lattice: Lattice) -> int:
+    """How far from where it falls at the predicted pose matching may look up an end point.
 
-    The window itself; what a square of poses reaches beyond it; climbing and drawing, a few cells.
+    The window; what a square of poses reaches beyond it, in whole blocks; then climbing, the lattice
+    of the proposal and, twice, a cell for interpolation.
     """
-    return (window.half_voxels + 2) * window.coarse + 2 * block_cells + 8
-
-
-@kernel
-def _motion_factor(matching, resolution_m):
-    factor = np.zeros((3, 3))
-    factor[0, 0] = factor[1, 1] = matching.translation_sigma_m / resolution_m
-    factor[2, 2] = matching.rotation_sigma_rad
-    return factor
+    beyond = window.coarse + 2 * block_cells + CLIMB_LIMIT + 2
+    return window.half_voxels * window.coarse + beyond + math.ceil(lattice.extent[0])
 
 
 @kernel

@@ -26,6 +26,7 @@ class Proposal(NamedTuple):
     factor: np.ndarray
     """shape (3, 3), lower Cholesky factor of the covariance"""
     log_eta: float
+    """Comparable with the log-likelihood of one pose: the prior's density is normalised (4.13)."""
 
 
 @kernel
@@ -69,7 +70,18 @@ def fit(field, points, match, predicted, resolution_m, objective, lattice):
     for i in range(3):
         for j in range(3):
             covariance[i, j] -= mean[i] * mean[j]
-    return Proposal(match + mean, _cholesky(covariance, 1e-12), highest + math.log(s))
+    log_eta = highest + math.log(s) + _log_cell_probability(objective, lattice)
+    return Proposal(match + mean, _cholesky(covariance, 1e-12), log_eta)
+
+
+@kernel
+def _log_cell_probability(objective, lattice):
+    """Log of a lattice cell's volume times the peak of p(x | x', u), which log_posterior leaves out."""
+    log_volume = 0.0
+    for axis in range(3):
+        log_volume += math.log(2.0 * lattice.extent[axis] / (lattice.samples - 1))
+    log_peak = math.log(objective.cell_precision) + 0.5 * math.log(objective.angle_precision)
+    return log_volume + log_peak - 1.5 * math.log(2.0 * math.pi)
 
 
 @kernel

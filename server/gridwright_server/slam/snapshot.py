@@ -1,5 +1,7 @@
 """A particle's map at one moment, read while the filter goes on."""
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,8 +28,9 @@ class TileSnapshot:
     ) -> None:
         table = pages.tables[particle]
         rows, columns = np.nonzero(table != NO_TILE)
-        self._tiles: NDArray[np.int32] | None = table[rows, columns]
+        self._tiles: NDArray[np.int32] = table[rows, columns]
         pool.retain(self._tiles)
+        self._owned = [self._tiles]
         self._pool = pool
         self._log_odds = pool.arrays.log_odds
         self.stamp_ns, self.revision, self.generation = stamp_ns, revision, generation
@@ -37,12 +40,11 @@ class TileSnapshot:
 
     def occupancy(self, tile: int) -> NDArray[np.int8]:
         """shape (tile_cells, tile_cells), [row, column]: -1 unknown, 0..100 probability in percent."""
-        if self._tiles is None:
+        if not self._owned:
             raise ValueError("the snapshot is closed")
         return occupancy_percent(self._log_odds[self._tiles[tile]])
 
     def close(self) -> None:
-        """Gives the tiles back; calling it twice is harmless."""
-        if self._tiles is not None:
-            self._pool.give_back(self._tiles)
-            self._tiles = None
+        """Gives the tiles back; calling it twice is harmless, from two threads at once too."""
+        with suppress(IndexError):
+            self._pool.give_back(self._owned.pop())

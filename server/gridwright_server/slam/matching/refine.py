@@ -7,6 +7,11 @@ import numpy as np
 from gridwright_server.jit import kernel
 
 HALVINGS = 5
+CLIMB_LIMIT = 3
+"""Cells, and steps of the angle, that climbing may lead away from the lattice's best pose.
+
+One would do for a smooth field; a patch is laid out no further than this.
+"""
 
 
 @kernel
@@ -49,6 +54,7 @@ def climb(field, points, start, predicted, resolution_m, window, objective):
     pose = start.copy()
     best = log_posterior(field, points, pose, predicted, resolution_m, objective)
     steps = np.array((0.5, 0.5, 0.5 * window.angle_step_rad))
+    limits = 2.0 * CLIMB_LIMIT * steps
     for _ in range(HALVINGS):
         improved = True
         while improved:
@@ -57,6 +63,8 @@ def climb(field, points, start, predicted, resolution_m, window, objective):
                 for sign in (-1.0, 1.0):
                     trial = pose.copy()
                     trial[axis] += sign * steps[axis]
+                    if abs(trial[axis] - start[axis]) > limits[axis]:
+                        continue
                     score = log_posterior(field, points, trial, predicted, resolution_m, objective)
                     if score > best:
                         best, pose, improved = score, trial, True
