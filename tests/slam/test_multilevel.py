@@ -4,9 +4,9 @@ import itertools
 
 import numpy as np
 import pytest
-from gridwright_server.slam.grid.patch import reachable_maximum
+from gridwright_server.slam.grid.patch import CoarseLevel, reachable_maximum
 from gridwright_server.slam.matching import multilevel
-from gridwright_server.slam.matching.multilevel import CoarseLevel, Objective, Window, search
+from gridwright_server.slam.matching.multilevel import Objective, Window, search
 from naive.exhaustive_search import best_pose, reachable
 from naive.one_map import block_maxima, field_of
 

@@ -5,6 +5,7 @@ import pytest
 from gridwright_server.config import SensorConfig
 from gridwright_server.slam.grid.lattice import PageTables, places_around
 from gridwright_server.slam.grid.likelihood import likelihood_model
+from gridwright_server.slam.grid.maps import Grid
 from gridwright_server.slam.grid.occupancy import (
     LOG_ODDS_UNIT,
     cells_seen,
@@ -15,7 +16,6 @@ from gridwright_server.slam.grid.occupancy import (
 )
 from gridwright_server.slam.grid.sector import sector_outline
 from gridwright_server.slam.grid.tiles import NO_TILE, UNKNOWN, TilePool
-from gridwright_server.slam.particles import Grid
 from naive.one_map import OneMap, block_maxima, cells_of_scan, field_of
 
 RESOLUTION_M, TILE_CELLS, BLOCK_CELLS = 0.1, 12, 4

@@ -1,7 +1,6 @@
 """Algorithm 1: the update of all particles with one scan."""
 
 import itertools
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -10,32 +9,16 @@ from numpy.typing import NDArray
 from gridwright_server.config import MapperConfig
 from gridwright_server.slam.beams import Beams
 from gridwright_server.slam.grid.lattice import PageTables, Places, places_around
-from gridwright_server.slam.grid.likelihood import LikelihoodModel, likelihood_model
-from gridwright_server.slam.grid.occupancy import log_odds_units
+from gridwright_server.slam.grid.maps import Maps, View
 from gridwright_server.slam.grid.sector import sector_outline
-from gridwright_server.slam.grid.tiles import MINIMUM_TILE_CELLS, TilePool
-from gridwright_server.slam.matching.multilevel import Objective, Window
+from gridwright_server.slam.grid.tiles import TilePool
 from gridwright_server.slam.motion import MotionNoise, noise_of
-from gridwright_server.slam.particles import (
-    Grid,
-    Maps,
-    Matching,
-    Proposed,
-    View,
-    fit_at,
-    integrate_scan,
-    propose,
-    search_slack_cells,
-    want,
-)
-from gridwright_server.slam.proposal import Lattice
+from gridwright_server.slam.parameters import DRAW_LIMIT, Parameters
+from gridwright_server.slam.particles import Proposed, fit_at, integrate_scan, propose, want
 from gridwright_server.slam.resampling import effective_sample_size, low_variance_ancestors, normalised
 from gridwright_server.slam.se2 import compose_all, wrap
 from gridwright_server.slam.trajectory import Ancestry
 from gridwright_server.slam.types import Pose, Workers
-
-DRAW_LIMIT = 3.0
-"""Standard normal draws are cut off here, so that a particle stays within the patch it was matched in."""
 
 
 class ParticleFilter:
@@ -49,12 +32,8 @@ class ParticleFilter:
         self._config, self._seed = config, seed
         self._workers = workers
         self._shares = _shares(config.particles, worker_count)
-        model = likelihood_model(config.sensor, config.grid.resolution_meters)
-        self.grid = _grid_of(config, model)
-        self._lattice = _lattice_of(config)
-        self._window = _window_of(config, 1)
-        self._wide_window = _window_of(config, config.matching.widening)
-        self._likelihood_scale = model.log_likelihood_per_step * config.sensor.likelihood_gain
+        self._parameters = Parameters(config)
+        self.grid = self._parameters.grid
         self.pool = TilePool(self.grid.tile_cells, self.grid.block_cells)
         self.pages = PageTables(config.particles, self.pool)
         self.ancestry = Ancestry()
@@ -116,17 +95,11 @@ class ParticleFilter:
 
     def _places(self, poses: NDArray[np.float64], beams: Beams, noise: MotionNoise) -> Places:
         """The parts of the maps that an update can touch; made room for."""
-        slack_cells = search_slack_cells(self._wide_window, self.grid.block_cells, self._lattice)
-        slack_cells += len(self.grid.stamp)  # a surface that goes changes the field that far around it
-        slack_m = slack_cells * self.grid.resolution_m + DRAW_LIMIT * noise.translation_m
-        places = places_around(poses, beams.reach_m + slack_m, self._tile_m)
+        radius_m = beams.reach_m + self._parameters.slack_m + DRAW_LIMIT * noise.translation_m
+        places = places_around(poses, radius_m, self._parameters.tile_m)
         self.pages.check(places.box)
         self.pages.cover(places.box)
         return places
-
-    @property
-    def _tile_m(self) -> float:
-        return self.grid.tile_cells * self.grid.resolution_m
 
     def _view(self, beams: Beams) -> View:
         margin_m = self.grid.resolution_m
@@ -157,25 +130,11 @@ class ParticleFilter:
             np.empty(count),
             np.empty(count, np.int64),
         )
-        maps, matching = self._maps(places), self._matching(noise)
+        maps, matching = self._maps(places), self._parameters.matching(noise)
         self._on_all(
             lambda begin, end: propose(maps, predicted, draws, view, self.grid, matching, begin, end, out)
         )
         return out
-
-    def _matching(self, noise: MotionNoise) -> Matching:
-        config, resolution_m = self._config, self.grid.resolution_m
-        return Matching(
-            self._window,
-            self._wide_window,
-            Objective(
-                self._likelihood_scale, (resolution_m / noise.translation_m) ** 2, 1.0 / noise.rotation_rad**2
-            ),
-            self._lattice,
-            config.matching.minimum_score,
-            noise.translation_m,
-            noise.rotation_rad,
-        )
 
     def _weigh(self, proposed: Proposed) -> None:
         log_eta = proposed.log_weights * self._config.sensor.weight_gain
@@ -230,43 +189,6 @@ class ParticleFilter:
 def _shares(particles: int, worker_count: int) -> list[tuple[int, int]]:
     cuts = np.linspace(0, particles, min(worker_count, particles) + 1).round().astype(int).tolist()
     return list(itertools.pairwise(cuts))
-
-
-def _grid_of(config: MapperConfig, model: LikelihoodModel) -> Grid:
-    factor = config.grid.coarse_factor
-    quarter = _quarter(factor)
-    return Grid(
-        config.grid.resolution_meters,
-        factor * math.ceil(MINIMUM_TILE_CELLS / factor),
-        next(block for block in (5, 4, 3, 2, 1) if quarter % block == 0),
-        log_odds_units(config.grid.free_log_odds),
-        log_odds_units(config.grid.hit_log_odds),
-        log_odds_units(config.grid.log_odds_limit),
-        model.stamp,
-    )
-
-
-def _quarter(coarse_factor: int) -> int:
-    return coarse_factor // 2 if coarse_factor % 2 == 0 else coarse_factor
-
-
-def _window_of(config: MapperConfig, widening: int) -> Window:
-    matching, factor = config.matching, config.grid.coarse_factor
-    voxel_m = config.grid.resolution_meters * factor
-    # Rounded up to whole voxels and steps; the small number forgives binary fractions.
-    return Window(
-        widening * math.ceil(matching.window_meters / voxel_m - 1e-9),
-        widening * math.ceil(matching.window_radians / matching.angle_step_radians - 1e-9),
-        matching.angle_step_radians,
-        factor,
-        _quarter(factor),
-    )
-
-
-def _lattice_of(config: MapperConfig) -> Lattice:
-    extent_cells = config.proposal.extent_meters / config.grid.resolution_meters
-    extent = np.array((extent_cells, extent_cells, config.proposal.extent_radians))
-    return Lattice(extent, config.proposal.samples_per_axis)
 
 
 def _mixture_covariance(

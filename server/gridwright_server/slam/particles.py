@@ -1,61 +1,19 @@
 """What one update does to one particle: match, propose and draw; then integrate (Algorithm 1)."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gridwright_server.jit import kernel
+from gridwright_server.slam.grid.maps import Grid, Maps, View, corner_m_of
 from gridwright_server.slam.grid.occupancy import cells_seen, integrate, tiles_wanted
-from gridwright_server.slam.grid.patch import gather, reachable_maximum, tiles_reached
-from gridwright_server.slam.grid.tiles import TileArrays
-from gridwright_server.slam.matching.multilevel import CoarseLevel, Objective, Window, search
-from gridwright_server.slam.matching.refine import CLIMB_LIMIT, climb, interpolated_sum
-from gridwright_server.slam.proposal import Lattice, Proposal, covariance_of, draw, fit
+from gridwright_server.slam.grid.patch import gather, new_patch, tiles_reached
+from gridwright_server.slam.matching.match import Matching, find, mean_field
+from gridwright_server.slam.matching.refine import interpolated_sum
+from gridwright_server.slam.proposal import Proposal, covariance_of, draw, fit
 from gridwright_server.slam.se2 import wrap
 from gridwright_server.slam.types import Pose
-
-FULL_SCORE = 255.0
-"""The field on a surface."""
-
-
-class Grid(NamedTuple):
-    """Geometry of the maps and the model of their update; the same for all particles."""
-
-    resolution_m: float
-    tile_cells: int
-    block_cells: int
-    free: int
-    """What a cell loses when a beam crosses it, in LOG_ODDS_UNIT; and what it gains when hit."""
-    hit: int
-    limit: int
-    """Log-odds stay within +- this."""
-    stamp: NDArray[np.uint8]
-    """The likelihood field around a lone surface."""
-
-
-class View(NamedTuple):
-    """The scan as all particles see it, in base_link."""
-
-    points: NDArray[np.float64]
-    """shape (returns, 2): what the beams hit"""
-    outline: NDArray[np.float64]
-    """shape (corners, 2): the polygon seen free"""
-
-
-class Matching(NamedTuple):
-    """How to match a scan and how to draw from what is found."""
-
-    window: Window
-    wide_window: Window
-    """Searched where the window holds no match, or one at its border."""
-    objective: Objective
-    lattice: Lattice
-    minimum_score: float
-    translation_sigma_m: float
-    """Of the motion model, for particles whose match fails."""
-    rotation_sigma_rad: float
 
 
 class Proposed(NamedTuple):
@@ -73,26 +31,6 @@ class Proposed(NamedTuple):
     """mean field of an end point at the match, 0..1"""
     quarters: NDArray[np.int64]
     """how many quarters of voxels the search had to score; see matching.multilevel"""
-
-
-class Maps(NamedTuple):
-    """Each particle's map around its pose."""
-
-    arrays: TileArrays
-    tables: NDArray[np.int32]
-    """shape (particles, size, size): page tables"""
-    first_cells: NDArray[np.int64]
-    """shape (particles, 2): lattice row and column of the first cell of each page table"""
-
-
-class Patch(NamedTuple):
-    """The part of a particle's map around its pose, laid out densely; storage used again and again."""
-
-    field: NDArray[np.uint8]
-    blocks: NDArray[np.uint8]
-    scratch: NDArray[np.uint8]
-    reached: NDArray[np.bool_]
-    level: CoarseLevel
 
 
 @kernel
@@ -115,10 +53,10 @@ def propose(
     patch = new_patch(maps.tables.shape[1], grid)
     for p in range(begin, end):
         # From here on poses are (column, row, theta), in cells counted from the patch's corner.
-        corner_m = _corner_m(maps, p, resolution)
+        corner_m = corner_m_of(maps, p, resolution)
         expected = predicted[p].copy()
         expected[:2] = (expected[:2] - corner_m) / resolution
-        match, score, quarters = _find(maps, p, expected, view, grid, matching, patch)
+        match, score, quarters = find(maps, p, expected, view, grid, matching, patch)
         if score < matching.minimum_score:  # lines 6-8
             proposal = _motion_proposal(maps, p, expected, draws[p], view, grid, matching, patch)
         else:  # lines 9-33
@@ -135,22 +73,6 @@ def propose(
 
 
 @kernel
-def _find(maps, p, expected, view, grid, matching, patch):
-    """The match and its score, and how many quarters were scored for it.
-
-    Where the window holds none, or one at its border, odometry may be wrong, not only noisy: the wide
-    window is searched too.
-    """
-    match, score, at_border, quarters = _match(
-        maps, p, expected, view, grid, matching, matching.window, patch
-    )
-    if at_border or score < matching.minimum_score:
-        match, score, _, more = _match(maps, p, expected, view, grid, matching, matching.wide_window, patch)
-        quarters += more
-    return match, score, quarters
-
-
-@kernel
 def _motion_proposal(maps, p, expected, normals, view, grid, matching, patch):
     """The motion model, for want of a match; weighed at the pose that `normals` draw from it."""
     factor = np.zeros((3, 3))
@@ -162,92 +84,6 @@ def _motion_proposal(maps, p, expected, normals, view, grid, matching, patch):
     gather(maps.arrays.field, maps.tables[p], patch.reached, patch.field)
     total = interpolated_sum(patch.field, view.points, drawn[0], drawn[1], drawn[2], grid.resolution_m)
     return Proposal(expected, factor, matching.objective.likelihood_scale * total)
-
-
-@kernel
-def _match(maps, p, expected, view, grid, matching, window, patch):
-    """The best pose of a window around the expected one, refined.
-
-    Returns (column, row, theta), its score, whether it lies at the window's border, and the number of
-    quarters scored.
-    """
-    resolution = grid.resolution_m
-    _lay_out(maps, p, expected, view, grid, matching.lattice, window, patch)
-    found = search(patch.field, patch.level, view.points, expected, resolution, window, matching.objective)
-    best = expected.copy()
-    best[0] += found.column
-    best[1] += found.row
-    best[2] += found.step * window.angle_step_rad
-    match = climb(patch.field, view.points, best, expected, resolution, window, matching.objective)
-    score = mean_field(patch.field, view.points, match, resolution)
-    return match, score, _is_at_border(found, window), found.quarters_scored
-
-
-@kernel
-def _is_at_border(found, window):
-    first, last = -window.half_voxels * window.coarse, window.half_voxels * window.coarse - 1
-    return found.row in (first, last) or found.column in (first, last) or abs(found.step) == window.half_steps
-
-
-@kernel
-def mean_field(field, points, pose, resolution_m):
-    """How well a scan fits at a pose, (column, row, theta) in cells of the patch: 1 = all on surfaces."""
-    total = interpolated_sum(field, points, pose[0], pose[1], pose[2], resolution_m)
-    return total / (FULL_SCORE * max(len(points), 1))
-
-
-@kernel
-def new_patch(size, grid):
-    """Storage for the part of a map that `size` x `size` tiles cover."""
-    blocks_along = size * grid.tile_cells // grid.block_cells
-    blocks = np.empty((blocks_along, blocks_along), np.uint8)
-    return Patch(
-        np.empty((size * grid.tile_cells, size * grid.tile_cells), np.uint8),
-        blocks,
-        np.empty_like(blocks),
-        np.empty((size, size), np.bool_),
-        CoarseLevel(grid.block_cells, np.empty_like(blocks), np.empty_like(blocks)),
-    )
-
-
-@kernel
-def _lay_out(maps, p, expected, view, grid, lattice, window, patch):
-    """Fills a patch with what a search of the window can reach of the particle's map."""
-    slack_cells = search_slack_cells(window, grid.block_cells, lattice)
-    slack_rad = (window.half_steps + CLIMB_LIMIT) * window.angle_step_rad + lattice.extent[2]
-    tiles_reached(view.points, expected, slack_cells, slack_rad, grid, patch.reached)
-    gather(maps.arrays.field, maps.tables[p], patch.reached, patch.field)
-    gather(maps.arrays.blocks, maps.tables[p], patch.reached, patch.blocks)
-    reachable_maximum(patch.blocks, grid.block_cells, window.coarse, patch.scratch, patch.level.voxel)
-    reachable_maximum(patch.blocks, grid.block_cells, window.quarter, patch.scratch, patch.level.quarter)
-
-
-@kernel
-def fit_at(maps: Maps, p: int, pose: Pose, points: NDArray[np.float64], grid: Grid) -> float:
-    """How well a scan's points fit the map of particle p from a pose, map_from_base: 1 = all on surfaces."""
-    patch = new_patch(maps.tables.shape[1], grid)
-    local = pose.copy()
-    local[:2] = (local[:2] - _corner_m(maps, p, grid.resolution_m)) / grid.resolution_m
-    tiles_reached(points, local, 2, 0.0, grid, patch.reached)
-    gather(maps.arrays.field, maps.tables[p], patch.reached, patch.field)
-    return mean_field(patch.field, points, local, grid.resolution_m)
-
-
-@kernel
-def _corner_m(maps, p, resolution_m):
-    """x and y of the first corner of a particle's part of the map."""
-    return np.array((maps.first_cells[p, 1] * resolution_m, maps.first_cells[p, 0] * resolution_m))
-
-
-@kernel
-def search_slack_cells(window: Window, block_cells: int, lattice: Lattice) -> int:
-    """How far from where it falls at the predicted pose matching may look up an end point.
-
-    The window; what a square of poses reaches beyond it, in whole blocks; then climbing, the lattice
-    of the proposal and, twice, a cell for interpolation.
-    """
-    beyond = window.coarse + 2 * block_cells + CLIMB_LIMIT + 2
-    return window.half_voxels * window.coarse + beyond + math.ceil(lattice.extent[0])
 
 
 @kernel
@@ -286,3 +122,14 @@ def integrate_scan(
     for p in range(begin, end):
         runs, hits = cells_seen(view.outline, view.points, poses[p], grid.resolution_m)
         integrate(maps.arrays, maps.tables[p], maps.first_cells[p], runs, hits, grid)
+
+
+@kernel
+def fit_at(maps: Maps, p: int, pose: Pose, points: NDArray[np.float64], grid: Grid) -> float:
+    """How well a scan's points fit the map of particle p from a pose, map_from_base: 1 = all on surfaces."""
+    patch = new_patch(maps.tables.shape[1], grid)
+    local = pose.copy()
+    local[:2] = (local[:2] - corner_m_of(maps, p, grid.resolution_m)) / grid.resolution_m
+    tiles_reached(points, local, 2, 0.0, grid, patch.reached)
+    gather(maps.arrays.field, maps.tables[p], patch.reached, patch.field)
+    return mean_field(patch.field, points, local, grid.resolution_m)

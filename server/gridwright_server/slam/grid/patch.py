@@ -5,9 +5,45 @@ number of tiles; only the tiles that end points can fall in are filled, the rest
 """
 
 import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gridwright_server.jit import kernel
 from gridwright_server.slam.grid.tiles import NO_TILE
+
+
+class CoarseLevel(NamedTuple):
+    """The field's maxima over what a voxel's and a quarter's end points can reach; per block."""
+
+    block_cells: int
+    voxel: NDArray[np.uint8]
+    quarter: NDArray[np.uint8]
+
+
+class Patch(NamedTuple):
+    """The part of a particle's map around its pose, laid out densely; storage used again and again."""
+
+    field: NDArray[np.uint8]
+    blocks: NDArray[np.uint8]
+    scratch: NDArray[np.uint8]
+    reached: NDArray[np.bool_]
+    level: CoarseLevel
+
+
+@kernel
+def new_patch(size, grid):
+    """Storage for the part of a map that `size` x `size` tiles cover."""
+    blocks_along = size * grid.tile_cells // grid.block_cells
+    blocks = np.empty((blocks_along, blocks_along), np.uint8)
+    return Patch(
+        np.empty((size * grid.tile_cells, size * grid.tile_cells), np.uint8),
+        blocks,
+        np.empty_like(blocks),
+        np.empty((size, size), np.bool_),
+        CoarseLevel(grid.block_cells, np.empty_like(blocks), np.empty_like(blocks)),
+    )
 
 
 @kernel

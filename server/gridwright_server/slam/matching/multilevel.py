@@ -54,14 +54,6 @@ class Objective(NamedTuple):
     """1 / variance of the predicted heading, in 1 / rad^2"""
 
 
-class CoarseLevel(NamedTuple):
-    """The field's maxima over what a voxel's and a quarter's end points can reach; see grid.patch."""
-
-    block_cells: int
-    voxel: np.ndarray
-    quarter: np.ndarray
-
-
 class LatticeMatch(NamedTuple):
     """The best pose of the window, as offsets from the predicted pose."""
 
