@@ -8,19 +8,18 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
-OUT ?= out
 INSTALLED := .venv/.installed
 
 .PHONY: demo test lint lock install
 
 ifdef LOG
 demo: install
-	$(BIN)/gridwright replay "$(LOG)" --out "$(OUT)/$(basename $(basename $(notdir $(LOG))))"
+	$(BIN)/gridwright replay "$(LOG)"
 else
 demo: install
-	$(BIN)/gridwright simulate $(OUT)/demo/building.clf
-	$(BIN)/gridwright replay $(OUT)/demo/building.clf --out $(OUT)/demo
-	$(BIN)/gridwright evaluate $(OUT)/demo/trajectory.tum $(OUT)/demo/building.relations
+	$(BIN)/gridwright simulate out/demo/building.clf
+	$(BIN)/gridwright replay out/demo/building.clf --out out/demo
+	$(BIN)/gridwright evaluate out/demo/trajectory.tum out/demo/building.relations
 endif
 
 test: install

@@ -62,6 +62,7 @@ class MatchingConfig:
     window_radians: float = bounded(0.25, 0.001, math.pi)
     angle_step_radians: float = bounded(0.0087, 0.001, 1.0)
     minimum_score: float = bounded(0.3, 0.0, 1.0)
+    doubtful_score: float = bounded(0.6, 0.0, 1.0)
     widening: int = bounded(3, 1, 10)
 
 

@@ -116,6 +116,32 @@ class TestWhereItIs:
         late = np.array([se2.between(a, b) for a, b in zip(poses, path, strict=True)])
         assert np.hypot(late[:, 0], late[:, 1]).max() < 0.08
 
+    def test_it_notices_that_the_robot_moves_though_its_wheels_say_no(self, mapper):
+        """Odometry that never moves: what the scans show is all there is to go by."""
+        poses = drive(STEPS)
+        results = feed(mapper, poses, [poses[0]] * len(poses))
+        assert sum(result.verdict is Verdict.PROCESSED for result in results) > STEPS // 3
+        away_m, away_rad = errors(poses[-1:], results[-1:])
+        assert away_m[0] < 0.2
+        assert away_rad[0] < 0.1
+
+    def test_a_step_beyond_the_window_is_found_in_the_wide_one(self, mapper):
+        poses = drive(STEPS)
+        jump = np.array((0.7, 0.0, 0.0))  # almost twice the window's half
+        odometry = [pose + jump * (k >= STEPS // 2) for k, pose in enumerate(poses)]
+        away_m, _ = errors(poses, feed(mapper, poses, odometry))
+        assert away_m[STEPS // 2] < 0.08
+
+    def test_each_laser_has_its_own_motion_filter(self, mapper):
+        """Two lasers that fire at once: the second one's scans count, too."""
+        poses = drive(6)
+        rng = np.random.default_rng(7)
+        for k, pose in enumerate(poses):
+            mapper.add_odometry(k * SECOND_NS, pose)
+            for base_from_laser in (FRONT, BACKWARDS):
+                scan = scan_at(k * SECOND_NS, pose, rng, base_from_laser=base_from_laser)
+                assert mapper.add_scan(scan).verdict is Verdict.PROCESSED
+
     def test_walls_are_occupied_and_the_floor_is_free(self, mapper):
         poses = drive(STEPS)
         feed(mapper, poses, drifting(poses))

@@ -12,6 +12,7 @@ from gridwright_server.slam.grid.lattice import PageTables, Places, places_aroun
 from gridwright_server.slam.grid.maps import Maps, View
 from gridwright_server.slam.grid.sector import sector_outline
 from gridwright_server.slam.grid.tiles import TilePool
+from gridwright_server.slam.matching.match import Matching
 from gridwright_server.slam.motion import MotionNoise, noise_of
 from gridwright_server.slam.parameters import DRAW_LIMIT, Parameters
 from gridwright_server.slam.particles import Proposed, fit_at, integrate_scan, propose, want
@@ -71,7 +72,8 @@ class ParticleFilter:
         view = self._view(beams)
         draws, comb_offset = self._draw()
         # x^ = argmax p(x | m, z, x'); x_t ~ N(mu, Sigma), or from the motion model where that fails
-        proposed = self._propose(places, predicted, draws, view, noise)
+        matching = self._parameters.matching(noise, len(beams.bearings_rad))
+        proposed = self._propose(places, predicted, draws, view, matching)
         self.poses = proposed.poses
         # w_t = w_{t-1} * eta
         self._weigh(proposed)
@@ -119,7 +121,7 @@ class ParticleFilter:
         predicted: NDArray[np.float64],
         draws: NDArray[np.float64],
         view: View,
-        noise: MotionNoise,
+        matching: Matching,
     ) -> Proposed:
         count = len(predicted)
         out = Proposed(
@@ -130,7 +132,7 @@ class ParticleFilter:
             np.empty(count),
             np.empty(count, np.int64),
         )
-        maps, matching = self._maps(places), self._parameters.matching(noise)
+        maps = self._maps(places)
         self._on_all(
             lambda begin, end: propose(maps, predicted, draws, view, self.grid, matching, begin, end, out)
         )

@@ -17,6 +17,12 @@ from gridwright_server.slam.proposal import Lattice
 DRAW_LIMIT = 3.0
 """Standard normal draws are cut off here, so that a particle stays within the part of the map laid out."""
 
+INDEPENDENT_BEAMS = 180
+"""A scan of more beams says no more than one of so many: neighbours closer than a degree see the same.
+
+So odometry, the scan and the particles' weights keep their balance whatever the laser's resolution.
+"""
+
 
 class Parameters:
     """A configuration's constants, worked out once."""
@@ -28,7 +34,7 @@ class Parameters:
         self._wide_window = _window_of(config, config.matching.widening)
         self._lattice = _lattice_of(config)
         self._likelihood_scale = model.log_likelihood_per_step * config.sensor.likelihood_gain
-        self._minimum_score = config.matching.minimum_score
+        self._scores = config.matching.minimum_score, config.matching.doubtful_score
 
     @property
     def tile_m(self) -> float:
@@ -45,10 +51,10 @@ class Parameters:
         # A surface that goes changes the field a stamp's size around it.
         return (searched + drawn + len(self.grid.stamp)) * self.grid.resolution_m
 
-    def matching(self, noise: MotionNoise) -> Matching:
-        """How to match after a motion with that noise."""
+    def matching(self, noise: MotionNoise, beams: int) -> Matching:
+        """How to match a scan of that many beams after a motion with that noise."""
         objective = Objective(
-            self._likelihood_scale,
+            self._likelihood_scale * min(1.0, INDEPENDENT_BEAMS / max(beams, 1)),
             (self.grid.resolution_m / noise.translation_m) ** 2,
             1.0 / noise.rotation_rad**2,
         )
@@ -57,7 +63,7 @@ class Parameters:
             self._wide_window,
             objective,
             self._lattice,
-            self._minimum_score,
+            *self._scores,
             noise.translation_m,
             noise.rotation_rad,
         )

@@ -18,10 +18,11 @@ class Matching(NamedTuple):
 
     window: Window
     wide_window: Window
-    """Searched where the window holds no match, or one at its border."""
+    """Searched where the window holds a doubtful match, or one at its border."""
     objective: Objective
     lattice: Lattice
     minimum_score: float
+    doubtful_score: float
     translation_sigma_m: float
     """Of the motion model, for particles whose match fails."""
     rotation_sigma_rad: float
@@ -31,13 +32,13 @@ class Matching(NamedTuple):
 def find(maps, p, expected, view, grid, matching, patch):
     """The match and its score, and how many quarters were scored for it.
 
-    Where the window holds none, or one at its border, odometry may be wrong, not only noisy: the wide
-    window is searched too.
+    Where the window holds a doubtful one, or one at its border, odometry may be wrong, not only noisy:
+    the wide window is searched too.
     """
     match, score, at_border, quarters = _match(
         maps, p, expected, view, grid, matching, matching.window, patch
     )
-    if at_border or score < matching.minimum_score:
+    if at_border or score < matching.doubtful_score:
         match, score, _, more = _match(maps, p, expected, view, grid, matching, matching.wide_window, patch)
         quarters += more
     return match, score, quarters
