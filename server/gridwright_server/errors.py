@@ -5,6 +5,7 @@ GridwrightError
 ├── NotFoundError              no such session
 ├── AlreadyExistsError         the session id is taken
 ├── FailedPreconditionError    not in the session's present state
+├── OutOfRangeError            older than what the session still takes
 ├── ResourceExhaustedError     a limit of the server is reached
 └── UnavailableError           the server is starting or stopping: try again
 """
@@ -52,6 +53,10 @@ class AlreadyExistsError(GridwrightError):
 
 class FailedPreconditionError(GridwrightError):
     """The request is right, but not in the session's present state."""
+
+
+class OutOfRangeError(GridwrightError):
+    """An item older than what the session still takes."""
 
 
 class ResourceExhaustedError(GridwrightError):

@@ -83,10 +83,11 @@ def test_reads_before_any_scan(fake_server):
 
 def test_a_scan_before_odometry_is_rejected(fake_server):
     fake_server.client.create_session("a")
-    response = fake_server.mapping.AddLaserScan(
-        mapping.AddLaserScanRequest(session_id="a", scan=scan_message()), timeout=20.0
-    )
-    assert not response.HasField("pose")
+    with pytest.raises(grpc.RpcError) as refusal:
+        fake_server.mapping.AddLaserScan(
+            mapping.AddLaserScanRequest(session_id="a", scan=scan_message()), timeout=20.0
+        )
+    assert refusal.value.code() is grpc.StatusCode.FAILED_PRECONDITION
     assert fake_server.client.get_session("a").counts.rejected_no_odometry == 1
     assert failure(fake_server.client.pose, "a")[1] == "NO_SCAN_YET"
 

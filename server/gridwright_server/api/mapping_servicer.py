@@ -16,6 +16,7 @@ from gridwright_server.api.convert.results import (
 )
 from gridwright_server.api.convert.sensor import odometry_request_item, scan_request_item, start_of
 from gridwright_server.api.open_streams import OpenStreams
+from gridwright_server.api.rejections import raise_if_rejected
 from gridwright_server.api.sensor_stream import SensorStream
 from gridwright_server.errors import FailedPreconditionError, GridwrightError
 from gridwright_server.session.items import Outcome, SensorItem
@@ -95,7 +96,7 @@ class MappingServicer(MappingServiceServicer):
 
 
 def _processed(session: Session, item: SensorItem) -> Outcome:
-    """Submits the item and waits for its outcome."""
+    """Submits the item and waits for its outcome; raises where it was rejected."""
     future: Future[Outcome] = Future()
 
     def deliver(outcome: Outcome | GridwrightError) -> None:
@@ -105,7 +106,9 @@ def _processed(session: Session, item: SensorItem) -> Outcome:
             future.set_result(outcome)
 
     session.submit(item, deliver)
-    return future.result()
+    outcome = future.result()
+    raise_if_rejected(outcome.verdict)
+    return outcome
 
 
 def _no_scan_yet(session: Session) -> GridwrightError:
