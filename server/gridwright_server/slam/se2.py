@@ -11,7 +11,7 @@ from gridwright_server.slam.types import Pose
 
 @kernel
 def wrap(angle_rad: float) -> float:
-    """The same angle in [-pi, pi)."""
+    """The same angle in [-pi, pi); up to rounding, which may give pi itself."""
     return float((angle_rad + math.pi) % (2.0 * math.pi) - math.pi)
 
 
