@@ -41,6 +41,7 @@ install: $(INSTALLED)
 
 # Without ensurepip, which some distributions pack apart: the machine's pip installs into the new environment.
 $(INSTALLED): requirements.lock pyproject.toml proto/build_hook.py $(wildcard proto/gridwright/v1/*.proto)
+	@$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "Gridwright needs Python >= 3.11: make PYTHON=python3.11")'
 	$(PYTHON) -m venv --without-pip .venv
 	$(PYTHON) -m pip --python $(BIN)/python --disable-pip-version-check --quiet install \
 		--require-hashes --requirement requirements.lock
