@@ -210,6 +210,15 @@ def test_a_file_without_scans_is_no_log(tmp_path):
     assert_one_line(run(path), "not a CARMEN log", "line 1")
 
 
+@pytest.mark.parametrize(
+    "content", [b"", b"hello\n", b"# a comment\n", b"PARAM robot_front_laser_max 80 nohost 0\n"]
+)
+def test_nor_is_one_in_which_no_line_is_wrong(tmp_path, content):
+    path = tmp_path / "made.clf"
+    path.write_bytes(content)
+    assert_one_line(run(path), "not a CARMEN log")
+
+
 def test_a_log_without_odometry(tmp_path):
     assert_one_line(run(write(tmp_path / "made.clf", [rawlaser([1.0])])), "no odometry")
 

@@ -132,6 +132,17 @@ class TestWhereItIs:
         away_m, _ = errors(poses, feed(mapper, poses, odometry))
         assert away_m[STEPS // 2] < 0.08
 
+    def test_a_robot_at_rest_with_nothing_in_sight_stays_where_it_is(self, mapper):
+        """A scan without returns fits nothing; that is no sign of motion."""
+        poses = drive(3)
+        feed(mapper, poses, poses)
+        before = mapper.estimate().map_from_base
+        for k in range(4, 30):
+            mapper.add_odometry(k * SECOND_NS, poses[-1])
+            result = mapper.add_scan(nothing_seen(k * SECOND_NS))
+            assert result.verdict is Verdict.SKIPPED_BELOW_MOTION_THRESHOLD
+        assert np.array_equal(result.estimate.map_from_base, before)
+
     def test_each_laser_has_its_own_motion_filter(self, mapper):
         """Two lasers that fire at once: the second one's scans count, too."""
         poses = drive(6)

@@ -102,6 +102,8 @@ class Mapper:
             return True
         if is_update_due(self._config.motion, se2.between(odom_at_last, odom_from_base)):
             return True
+        if not len(beams.points):  # nothing in sight: no sign that the robot moved
+            return False
         return self._filter.fit_of(self._moved_to(odom_from_base), beams) < self._config.motion.update_score
 
     def _update(self, scan: Scan, odom_from_base: Pose, beams: Beams) -> None:

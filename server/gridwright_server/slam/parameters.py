@@ -90,10 +90,12 @@ def _quarter(coarse_factor: int) -> int:
 def _window_of(config: MapperConfig, widening: int) -> Window:
     matching, factor = config.matching, config.grid.coarse_factor
     voxel_m = config.grid.resolution_meters * factor
+    half_steps = math.ceil(matching.window_radians / matching.angle_step_radians - 1e-9)
+    once_around = math.ceil(math.pi / matching.angle_step_radians)
     # Rounded up to whole voxels and steps; the small number forgives binary fractions.
     return Window(
         widening * math.ceil(matching.window_meters / voxel_m - 1e-9),
-        widening * math.ceil(matching.window_radians / matching.angle_step_radians - 1e-9),
+        min(widening * half_steps, once_around),
         matching.angle_step_radians,
         factor,
         _quarter(factor),

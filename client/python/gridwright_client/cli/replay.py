@@ -119,10 +119,10 @@ def _read(path: Path) -> tuple[CarmenLog, list[Event]]:
     except OSError as error:
         fail(f"cannot read the log {os_error_text(error)}")
     if not content.scans:
-        first = f"; line {content.malformed[0].line_number}: {content.malformed[0].reason}"
+        malformed = "".join(f"; line {line.line_number}: {line.reason}" for line in content.malformed[:1])
         fail(
             f"{path} is not a CARMEN log with laser scans (FLASER, RLASER, ROBOTLASER1, ROBOTLASER2 or "
-            f"RAWLASER1 lines){first if content.malformed else ''}"
+            f"RAWLASER1 lines){malformed}"
         )
     try:
         return content, events_of(content)
